@@ -1,0 +1,233 @@
+"""The mechanics of a transmission as a hybrid automaton: margins, accelerations and the reset of its contacts."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import casadi as ca
+
+from actuator.hybrid import MARGIN_BAND
+from gear.elasticity import DEFLECTION_NOMINAL
+from gear.stiction import RestProblem, decide, friction
+from gear.transmission import Contact, Transmission
+
+REST_SPEED = 10 * MARGIN_BAND  # part of a contact's usual slip speed that counts as standing still
+INACTIVE = 1.0  # value of a margin that means nothing in the present mode
+
+
+class ContactModes(NamedTuple):
+    """The mode variables of a transmission."""
+
+    motion: ca.SX  # (K, 1): 0 stuck, +-1 sliding, +-2 stuck at the limit
+    flank: dict[str, ca.SX]  # per mesh: +1, -1, 0 in the gap
+
+
+class ContactForces(NamedTuple):
+    """All that the contacts of a transmission do at one state; vectors are (K, 1) in the order of the contacts."""
+
+    normal: dict[str, ca.SX]  # signed normal force per mesh [N]
+    slip: ca.SX  # slip speed
+    static: ca.SX  # friction limit at rest
+    sliding: ca.SX  # friction while sliding at the present speed
+    compliance: ca.SX  # G of the joint decision
+    demand: ca.SX  # slip acceleration without contact friction
+    friction: ca.SX  # the friction scalars of the present modes
+    acceleration: dict[str, ca.SX]  # per shaft [rad/s^2]
+
+
+class ContactMechanics:
+    """The contacts of one transmission, with inertias and torques of what is attached to it.
+
+    Parameters
+    ----------
+    gear : Transmission
+        Symbolic (its numbers are parameters).
+    redundant : bool
+        Whether several contacts can lock the same shafts.
+    inertia : mapping of str to SX
+        Total inertia per shaft.
+    """
+
+    def __init__(self, gear: Transmission, redundant: bool, inertia: Mapping[str, ca.SX]) -> None:
+        self.gear, self.redundant, self.inertia = gear, redundant, inertia
+        self.contacts: list[Contact] = gear.contacts()
+        self.gaps = {name: mesh.elasticity.total_gap for name, mesh in gear.meshes.items()}
+
+    def mode_names(self) -> list[str]:
+        """Names of the mode variables: a motion per contact, a flank per mesh."""
+        return [f"gear.{contact.name}.motion" for contact in self.contacts] + [
+            f"gear.meshes.{name}.flank" for name in self.gear.meshes
+        ]
+
+    def modes(self, m: ca.SX) -> ContactModes:
+        """The mode variables from the vector m; rounding is taken off here, once."""
+        tidy = [ca.if_else(ca.fabs(m[k]) < 0.5, 0, m[k]) for k in range(m.shape[0])]  # noqa: PLR2004
+        count = len(self.contacts)
+        flanks = [ca.sign(value) for value in tidy[count:]]
+        return ContactModes(ca.vertcat(*tidy[:count]), dict(zip(self.gear.meshes, flanks, strict=True)))
+
+    def slip_speeds(self, speed: Mapping[str, ca.SX]) -> ca.SX:
+        """Slip speed of each contact."""
+        return ca.vertcat(*(sum(c * speed[shaft] for shaft, c in contact.slip.items()) for contact in self.contacts))
+
+    def forces(self, angle: Mapping, speed: Mapping, torque: Mapping, modes: ContactModes) -> ContactForces:
+        """Friction and accelerations in the given modes, with `torque` per shaft from outside."""
+        direction = ca.sign(modes.motion)
+        slip = self.slip_speeds(speed)
+        normal = self.gear.normal_forces(angle, speed, modes.flank)
+        smooth = self.gear.torques(angle, speed, normal)
+        free = {shaft: (smooth[shaft] + torque.get(shaft, 0)) / self.inertia[shaft] for shaft in self.gear.shafts}
+        demand = ca.vertcat(*(sum(c * free[shaft] for shaft, c in contact.slip.items()) for contact in self.contacts))
+        compliance = self.compliance()
+        static, sliding = self.limits(normal, direction * slip, modes)
+        at_limit = ca.fabs(modes.motion) > 1.5  # noqa: PLR2004
+        given = direction * ca.if_else(at_limit, static, sliding)
+        held = ca.eq(direction, 0) * self._engaged(modes)
+        scalar = friction(compliance, demand, held, given, self.redundant)
+        acceleration = {
+            shaft: free[shaft]
+            + sum(
+                contact.torque[shaft] * scalar[k]
+                for k, contact in enumerate(self.contacts)
+                if shaft in contact.torque
+            )
+            / self.inertia[shaft]
+            for shaft in self.gear.shafts
+        }
+        return ContactForces(normal, slip, static, sliding, compliance, demand, scalar, acceleration)
+
+    def compliance(self) -> ca.SX:
+        """G of the joint decision: slip acceleration of contact i per unit of friction against it in contact k."""
+        count = len(self.contacts)
+        matrix = ca.SX(count, count)
+        for i, row in enumerate(self.contacts):
+            for k, column in enumerate(self.contacts):
+                shared = [shaft for shaft in row.slip if shaft in column.torque]
+                if shared:
+                    matrix[i, k] = -sum(row.slip[s] * column.torque[s] / self.inertia[s] for s in shared)
+        return matrix
+
+    def limits(self, normal: Mapping, speed: ca.SX, modes: ContactModes) -> tuple[ca.SX, ca.SX]:
+        """Friction limits at rest and while sliding at `speed` >= 0; zero in a gap."""
+        named = {contact.name: ca.fmax(speed[k], 0) for k, contact in enumerate(self.contacts)}
+        pairs = self.gear.friction_limits(normal, named)
+        engaged = self._engaged(modes)
+        static, sliding = (ca.vertcat(*(pairs[contact.name][j] for contact in self.contacts)) for j in (0, 1))
+        return engaged * static, engaged * sliding
+
+    def _engaged(self, modes: ContactModes) -> ca.SX:
+        """1 per contact, 0 for a mesh in its gap."""
+        return ca.vertcat(
+            *(
+                ca.fabs(modes.flank[contact.name.removeprefix("meshes.")]) if contact.name.startswith("meshes.") else 1
+                for contact in self.contacts
+            )
+        )
+
+    # -- margins --------------------------------------------------------------------------------------
+
+    def margin_names(self) -> list[str]:
+        """Two margins per contact, two per mesh with a gap and one per mesh without."""
+        names = [f"gear.{contact.name} {end}" for contact in self.contacts for end in ("upper", "lower")]
+        for name, gap in self.gaps.items():
+            names += [f"gear.meshes.{name} {side}" for side in (("flank",) if gap is None else ("flank +", "flank -"))]
+        return names
+
+    def margins(self, angle: Mapping, forces: ContactForces, modes: ContactModes) -> ca.SX:
+        """Margins in the order of `margin_names`.
+
+            stuck:    (static - s) and (static + s), over a usual friction force
+            sliding:  direction * slip speed, over a usual speed
+            flank:    flank * F_n without a gap, else the penetration or the distance to the flank
+        """
+        deflection = self.gear.deflections(angle)
+        rows = []
+        engaged = self._engaged(modes)
+        for k, contact in enumerate(self.contacts):
+            stuck = ca.logic_and(ca.eq(modes.motion[k], 0), engaged[k])
+            slides = ca.logic_and(ca.eq(ca.fabs(modes.motion[k]), 1), engaged[k])
+            speed = modes.motion[k] * forces.slip[k] / contact.speed_nominal
+            room = [(forces.static[k] - end * forces.friction[k]) / contact.force_nominal for end in (1, -1)]
+            rows += [
+                ca.if_else(stuck, room[0], ca.if_else(slides, speed, INACTIVE)),
+                ca.if_else(stuck, room[1], INACTIVE),
+            ]
+        for name, gap in self.gaps.items():
+            flank = modes.flank[name]
+            if gap is None:
+                rows.append(flank * forces.normal[name] / self.gear.meshes[name].elasticity.nominal_force)
+                continue
+            for side in (1, -1):
+                beyond = (side * deflection[name] - gap / 2) / DEFLECTION_NOMINAL
+                rows.append(ca.if_else(ca.eq(flank, side), beyond, ca.if_else(ca.eq(flank, 0), -beyond, INACTIVE)))
+        return ca.vertcat(*rows) + MARGIN_BAND
+
+    # -- reset ----------------------------------------------------------------------------------------
+
+    def flanks_after(self, fired: ca.SX, angle: Mapping, speed: Mapping, before: Mapping[str, ca.SX]) -> list[ca.SX]:
+        """Flank of each mesh after an event; from the deflection where the event was elsewhere."""
+        deflection = self.gear.deflections(angle)
+        row, found = 2 * len(self.contacts), []
+        for name, gap in self.gaps.items():
+            if gap is None:
+                force = self.gear.normal_forces(angle, speed, before)[name]
+                kept = ca.if_else(ca.fabs(force) > 0, ca.sign(force), 1)
+                turned = ca.if_else(ca.eq(before[name], 0), kept, -before[name])
+                found.append(ca.if_else(fired[row], turned, kept))
+                row += 1
+                continue
+            sides = ca.if_else(deflection[name] > gap / 2, 1, ca.if_else(deflection[name] < -gap / 2, -1, 0))
+            # the flank that fired: engaged if it was in the gap, in the gap if it was engaged
+            plus = ca.if_else(ca.eq(before[name], 0), 1, 0)
+            minus = ca.if_else(ca.eq(before[name], 0), -1, 0)
+            found.append(ca.if_else(fired[row], plus, ca.if_else(fired[row + 1], minus, sides)))
+            row += 2
+        return found
+
+    def problem(self, fired: ca.SX, angle: Mapping, speed: Mapping, torque: Mapping, before: ca.SX, flank: Mapping) -> RestProblem:
+        """What is to be decided jointly after an event: which contacts are at rest, and what they must bear."""
+        slip = self.slip_speeds(speed)
+        direction = ca.sign(slip)
+        modes = ContactModes(direction, dict(flank))
+        forces = self.forces(angle, speed, torque, modes)
+        rest, released = [], []
+        for k, contact in enumerate(self.contacts):
+            hit = ca.logic_or(fired[2 * k], fired[2 * k + 1])
+            was_stuck = ca.eq(before[k], 0)
+            slow = ca.fabs(slip[k]) <= REST_SPEED * contact.speed_nominal
+            rest.append(ca.logic_or(slow, hit))
+            released.append(ca.logic_and(hit, was_stuck))
+        resting = ca.vertcat(*rest) * self._engaged(modes)
+        onset = self.limits(forces.normal, ca.SX.zeros(len(self.contacts)), modes)[1]
+        return RestProblem(
+            compliance=forces.compliance,
+            demand=forces.demand,
+            static=forces.static,
+            sliding=onset,
+            rest=resting,
+            given=direction * forces.sliding,
+            released=ca.vertcat(*released),
+        )
+
+    def reset_function(self, name: str, arguments: list[ca.SX], fired: ca.SX, angle: Mapping, speed: Mapping, torque: Mapping, m: ca.SX) -> ca.Function:
+        """(fired, *arguments) -> speeds after, modes after, fault; all modes decided together.
+
+        Contacts at rest get their slip speed set to exactly zero by an impulse along their own friction.
+        """
+        before = self.modes(m)
+        flank = self.flanks_after(fired, angle, speed, before.flank)
+        named = dict(zip(self.gear.meshes, flank, strict=True))
+        problem = self.problem(fired, angle, speed, torque, before.motion, named)
+        impulse = friction(problem.compliance, self.slip_speeds(speed), problem.rest, ca.SX.zeros(len(self.contacts)), self.redundant)
+        speeds = [
+            speed[shaft]
+            + sum(c.torque[shaft] * impulse[k] for k, c in enumerate(self.contacts) if shaft in c.torque)
+            / self.inertia[shaft]
+            for shaft in self.gear.shafts
+        ]
+        pose = ca.Function(f"{name}_pose", [fired, *arguments], [*problem, ca.sign(self.slip_speeds(speed)), ca.vertcat(*flank), ca.vertcat(*speeds)])
+        inputs = [ca.MX.sym(f"input{i}", symbol.shape[0]) for i, symbol in enumerate((fired, *arguments))]
+        *posed, direction, flanks, after = pose(*inputs)
+        posed = RestProblem(*posed)
+        decision = decide(posed, self.redundant)
+        motion = ca.if_else(posed.rest, decision.motion, direction)
+        return ca.Function(name, inputs, [after, ca.vertcat(motion, flanks), decision.fault])

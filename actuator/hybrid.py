@@ -1,0 +1,93 @@
+"""HybridSystem: the only seam between models and analyses.
+
+Event rules, stated once:
+
+1. A margin is positive while the present modes hold, and fires when it falls through zero.
+2. `reset` decides ALL modes at once. It is told which margin fired, returns the state after the event (a
+   contact that sticks has its slip speed set to exactly zero) and leaves every margin non-negative.
+   With no margin fired it is the initialization: modes from the continuous state alone.
+3. Margins are dimensionless (a part of a usual speed, force or length) and stay positive by MARGIN_BAND
+   where the physics has them at exactly zero, so that an engine which only sees sign changes can arm them.
+4. The system does not depend on time; inputs do.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from actuator.parameters import Parameter, require_known
+
+MARGIN_BAND = 1e-10
+
+
+class Quantity(NamedTuple):
+    """A named signal with its unit and usual size."""
+
+    name: str
+    unit: str
+    nominal: float = 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class HybridSystem:
+    """Continuous states, modes, inputs, parameters and outputs, with the functions between them.
+
+        dx/dt = flow(x, m, u, p)
+        margins(x, m, u, p)                      >= 0 while the modes m hold
+        (x+, m+, fault) = reset(fired, x, m, u, p)    fault = 1 where no consistent modes were found
+        y = outputs(x, m, u, p)
+
+    Attributes
+    ----------
+    states, inputs, outputs : tuple of Quantity
+        In the order of the vectors x, u, y. Nominal sizes scale the error control.
+    modes : tuple of str
+        Names of the integer mode variables m.
+    margin_names : tuple of str
+        What is left when the margin falls through zero.
+    parameters : tuple of Parameter
+        In the order of p, with defaults.
+    flow, margins, reset, outputs_function : casadi.Function
+        As above; `fired` is a vector with 1 at the margin that fired.
+    """
+
+    name: str
+    states: tuple[Quantity, ...]
+    modes: tuple[str, ...]
+    inputs: tuple[Quantity, ...]
+    outputs: tuple[Quantity, ...]
+    margin_names: tuple[str, ...]
+    parameters: tuple[Parameter, ...]
+    flow: ca.Function
+    margins: ca.Function
+    reset: ca.Function
+    outputs_function: ca.Function
+
+    def parameter_values(self, changes: Mapping[str, float] | None = None) -> np.ndarray:
+        """Values of p: the defaults, with `changes` by name."""
+        changes = changes or {}
+        require_known(changes, [parameter.name for parameter in self.parameters], "parameter")
+        return np.array([float(changes.get(parameter.name, parameter.default)) for parameter in self.parameters])
+
+    def state_vector(self, values: Mapping[str, float] | None = None) -> np.ndarray:
+        """A state vector x by name; states not named are zero."""
+        values = values or {}
+        require_known(values, [state.name for state in self.states], "state")
+        return np.array([float(values.get(state.name, 0.0)) for state in self.states])
+
+    def input_vector(self, values: Mapping[str, float] | None = None) -> np.ndarray:
+        """An input vector u by name; inputs not named are zero."""
+        values = values or {}
+        require_known(values, [signal.name for signal in self.inputs], "input")
+        return np.array([float(values.get(signal.name, 0.0)) for signal in self.inputs])
+
+    def mode_vector(self, values: Mapping[str, int]) -> np.ndarray:
+        """A mode vector m by name; every mode must be named."""
+        require_known(values, self.modes, "mode")
+        missing = [name for name in self.modes if name not in values]
+        if missing:
+            raise KeyError(f"modes {', '.join(missing)} are not given; every contact needs one")
+        return np.array([float(values[name]) for name in self.modes])

@@ -1,0 +1,58 @@
+"""From numbers to symbols: every float field of a component becomes a named CasADi parameter."""
+
+import difflib
+from collections.abc import Iterable, Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any, NamedTuple, TypeVar
+
+import casadi as ca
+
+from gear.quantities import unit_of
+
+Component = TypeVar("Component")
+
+
+class Parameter(NamedTuple):
+    """A named number of a model, with its default value."""
+
+    name: str  # path through the components, "gear.meshes.first.friction.sliding"
+    unit: str
+    default: float
+    symbol: ca.SX
+
+
+def parameterize(component: Component, path: str) -> tuple[Component, list[Parameter]]:
+    """Copy a component with a symbol in place of every number that has a unit.
+
+    Counts, names and choices stay what they are: they decide the structure of the model. The copy is not
+    checked again (a symbol is neither positive nor negative); its methods work as those of the original.
+    """
+    found: list[Parameter] = []
+    return _copy(component, path, found), found
+
+
+def _copy(part: Any, path: str, found: list[Parameter]) -> Any:
+    if isinstance(part, Mapping):
+        return {name: _copy(item, f"{path}.{name}", found) for name, item in part.items()}
+    if not is_dataclass(part):
+        return part
+    copy = object.__new__(type(part))
+    for field in fields(part):
+        value, unit, name = getattr(part, field.name), unit_of(part, field.name), f"{path}.{field.name}"
+        if unit is not None and value is not None:
+            symbol = ca.SX.sym(name)
+            found.append(Parameter(name, unit, float(value), symbol))
+            value = symbol
+        else:
+            value = _copy(value, name, found)
+        object.__setattr__(copy, field.name, value)
+    return copy
+
+
+def require_known(names: Iterable[str], valid: Iterable[str], what: str) -> None:
+    """Raise KeyError for the first name that is not among the valid ones, with the nearest of them."""
+    valid = list(valid)
+    for name in names:
+        if name not in valid:
+            near = difflib.get_close_matches(name, valid, n=3, cutoff=0.4) or valid[:8]
+            raise KeyError(f"no {what} named {name!r}; did you mean {' or '.join(near)}?")

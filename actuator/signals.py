@@ -1,0 +1,193 @@
+"""Inputs over time. Between their break points all of them are a line plus sines."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+
+class Wave(NamedTuple):
+    """amplitude * sin(phase + frequency tau + rate tau^2 / 2), tau from the start of a piece."""
+
+    amplitude: float
+    phase: float  # rad
+    frequency: float  # rad/s
+    rate: float = 0.0  # rad/s^2
+
+
+class Piece(NamedTuple):
+    """offset + slope tau + sum of waves, with tau counted from the start of the piece."""
+
+    offset: float
+    slope: float = 0.0
+    waves: tuple[Wave, ...] = ()
+
+    def after(self, delay: float) -> "Piece":
+        """The same curve with tau counted from `delay` later."""
+        return Piece(
+            self.offset + self.slope * delay,
+            self.slope,
+            tuple(
+                Wave(
+                    wave.amplitude,
+                    wave.phase + wave.frequency * delay + wave.rate * delay**2 / 2,
+                    wave.frequency + wave.rate * delay,
+                    wave.rate,
+                )
+                for wave in self.waves
+            ),
+        )
+
+    def __call__(self, tau: float) -> float:
+        """Value at tau."""
+        return (
+            self.offset
+            + self.slope * tau
+            + sum(w.amplitude * math.sin(w.phase + w.frequency * tau + w.rate * tau**2 / 2) for w in self.waves)
+        )
+
+
+class Signal(Protocol):
+    """An input over time."""
+
+    def pieces(self) -> Sequence[tuple[float, Piece]]:
+        """Start times (ascending, the first is minus infinity) and what holds from there on."""
+        ...
+
+
+def piece_at(signal: "Signal", time: float) -> Piece:
+    """The piece that holds just after `time`, with tau counted from `time`."""
+    start, piece = [(start, piece) for start, piece in signal.pieces() if start <= time][-1]
+    return piece.after(time - start) if math.isfinite(start) else piece
+
+
+def break_points(signal: "Signal") -> list[float]:
+    """Times at which the signal is not smooth."""
+    return [start for start, _ in signal.pieces() if math.isfinite(start)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Constant:
+    """The same value for ever."""
+
+    value: float
+
+    def pieces(self) -> list[tuple[float, Piece]]:
+        """One piece."""
+        return [(-math.inf, Piece(self.value))]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step:
+    """`before` until `time` [s], `after` from then on."""
+
+    time: float = 0.0
+    before: float = 0.0
+    after: float
+
+    def pieces(self) -> list[tuple[float, Piece]]:
+        """Two constant pieces."""
+        return [(-math.inf, Piece(self.before)), (self.time, Piece(self.after))]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ramp:
+    """`start` until `time` [s], then `slope` per second, for ever or until `end` [s]."""
+
+    time: float = 0.0
+    start: float = 0.0
+    slope: float
+    end: float = math.inf
+
+    def pieces(self) -> list[tuple[float, Piece]]:
+        """Constant, line, constant."""
+        found = [(-math.inf, Piece(self.start)), (self.time, Piece(self.start, self.slope))]
+        if math.isfinite(self.end):
+            found.append((self.end, Piece(self.start + self.slope * (self.end - self.time))))
+        return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sine:
+    """`offset` until `time` [s], then offset + amplitude sin(2 pi frequency (t - time) + phase), frequency in Hz."""
+
+    amplitude: float
+    frequency: float
+    time: float = 0.0
+    offset: float = 0.0
+    phase: float = 0.0
+
+    def pieces(self) -> list[tuple[float, Piece]]:
+        """Constant, then one wave."""
+        wave = Wave(self.amplitude, self.phase, 2 * math.pi * self.frequency)
+        return [(-math.inf, Piece(self.offset)), (self.time, Piece(self.offset, waves=(wave,)))]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chirp:
+    """`offset` until `time` [s], then a sine whose frequency runs linearly from one value [Hz] to another."""
+
+    amplitude: float
+    first_frequency: float
+    last_frequency: float
+    duration: float
+    time: float = 0.0
+    offset: float = 0.0
+
+    def pieces(self) -> list[tuple[float, Piece]]:
+        """Constant, one wave, constant."""
+        rate = 2 * math.pi * (self.last_frequency - self.first_frequency) / self.duration
+        wave = Wave(self.amplitude, 0.0, 2 * math.pi * self.first_frequency, rate)
+        return [
+            (-math.inf, Piece(self.offset)),
+            (self.time, Piece(self.offset, waves=(wave,))),
+            (self.time + self.duration, Piece(self.offset)),
+        ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """Straight lines through the points (times [s], values); constant before the first and after the last."""
+
+    times: tuple[float, ...]
+    values: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.times) != len(self.values) or not self.times:
+            raise ValueError(f"Table needs as many values as times, got {len(self.values)} and {len(self.times)}")
+        if any(late <= early for early, late in zip(self.times, self.times[1:], strict=False)):
+            raise ValueError(f"Table.times must increase from point to point, got {self.times}")
+
+    def pieces(self) -> list[tuple[float, Piece]]:
+        """A constant, a line per interval, a constant."""
+        points = list(zip(self.times, self.values, strict=True))
+        found = [(-math.inf, Piece(self.values[0]))]
+        for (t0, v0), (t1, v1) in zip(points, points[1:], strict=False):
+            found.append((t0, Piece(v0, (v1 - v0) / (t1 - t0))))
+        found.append((self.times[-1], Piece(self.values[-1])))
+        return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sum:
+    """Several signals on one input."""
+
+    parts: tuple["Signal", ...]
+
+    def pieces(self) -> list[tuple[float, Piece]]:
+        """A piece between every two break points of the parts."""
+        starts = [-math.inf, *sorted({time for part in self.parts for time in break_points(part)})]
+        found = []
+        for start in starts:
+            pieces = [part.pieces()[0][1] if start == -math.inf else piece_at(part, start) for part in self.parts]
+            found.append(
+                (
+                    start,
+                    Piece(
+                        sum(piece.offset for piece in pieces),
+                        sum(piece.slope for piece in pieces),
+                        tuple(wave for piece in pieces for wave in piece.waves),
+                    ),
+                )
+            )
+        return found

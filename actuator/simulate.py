@@ -1,0 +1,111 @@
+"""Simulate one actuator over time."""
+
+import math
+import time as clock
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from actuator.actuator import Actuator
+from actuator.engine import INTERVALS, EngineOptions, Window, engine, join
+from actuator.hybrid import HybridSystem
+from actuator.parameters import require_known
+from actuator.run import Run, Statistics
+from actuator.signals import Constant, Signal, break_points, piece_at
+
+DEFAULT_POINTS = 2000
+
+
+def simulate(  # noqa: PLR0913 - a simulation has this many choices, all but two with defaults
+    plant: Actuator | HybridSystem,
+    duration: float,
+    *,
+    inputs: Mapping[str, Signal | float] | None = None,
+    start: Mapping[str, float] | None = None,
+    parameters: Mapping[str, float] | None = None,
+    resolution: float | None = None,
+    tolerance: float = 1e-6,
+    compiled: bool | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Run:
+    """Run an actuator from time zero through every stick and slip.
+
+    Parameters
+    ----------
+    plant : Actuator or HybridSystem
+        What to simulate.
+    duration : float
+        [s].
+    inputs : mapping of str to Signal or float
+        By name; inputs not named are zero.
+    start : mapping of str to float
+        Initial states by name; states not named are zero. Modes follow from them.
+    parameters : mapping of str to float
+        Values by name that differ from the defaults; the model is not built again.
+    resolution : float or None
+        Largest distance of output points [s]; None for a two-thousandth of the duration.
+    tolerance : float
+        Local error of each state over its nominal size.
+    compiled : bool or None
+        True and False insist on compiled and interpreted; None compiles where a C compiler is present.
+    progress : callable or None
+        Called with the simulated time [s] after every window.
+
+    Returns
+    -------
+    Run
+        Signals by name on the output points, mode changes, statistics.
+
+    Raises
+    ------
+    KeyError
+        Unknown input, state or parameter (the nearest names are given).
+    ValueError
+        Duration or resolution not positive.
+    SimulationError
+        Chattering, inconsistent modes, or a step that cannot be completed, with time and modes.
+    """
+    system = plant.system() if isinstance(plant, Actuator) else plant
+    resolution = duration / DEFAULT_POINTS if resolution is None else resolution
+    for name, value in (("duration", duration), ("resolution", resolution)):
+        if not (value > 0 and math.isfinite(value)):
+            raise ValueError(f"simulate: {name} must be > 0 s, got {value!r}")
+    signals = _signals(system, inputs or {})
+    waves = {
+        (wave.frequency, wave.rate) for signal in signals for _, piece in signal.pieces() for wave in piece.waves
+    }
+    x, p = system.state_vector(start), system.parameter_values(parameters)
+    machine = engine(system, EngineOptions(tolerance=tolerance, compiled=compiled, waves=len(waves)))
+
+    began = clock.perf_counter()
+    stops = sorted({time for signal in signals for time in break_points(signal) if 0 < time < duration} | {0.0, duration})
+    m = np.zeros(len(system.modes))
+    windows: list[Window] = []
+    for first, last in zip(stops, stops[1:], strict=False):
+        u = np.array([piece_at(signal, first)(0.0) for signal in signals])
+        x, settled = machine.settle(first, x, m, u, p)
+        jump = [(first, tuple(int(mode) for mode in settled))] if first > 0 and not np.array_equal(settled, m) else []
+        m = settled
+        count = math.ceil((last - first) / (INTERVALS * resolution) * (1 - 1e-12))
+        for k in range(count):
+            begin, end = (first + (last - first) * j / count for j in (k, k + 1))
+            window = machine.run(begin, end - begin, x, m, p, [piece_at(signal, begin) for signal in signals])
+            windows.append(window._replace(events=[*jump, *window.events]))
+            (x, m), jump = window.end, []
+            if progress is not None:
+                progress(end)
+    whole = join(windows)
+    wall = clock.perf_counter() - began
+    statistics = Statistics(
+        wall_s=wall, simulated_s=duration, events=len(whole.events), settled=whole.settled, compiled=machine.compiled
+    )
+    return Run.from_window(system, whole, statistics, p, signals)
+
+
+def _signals(system: HybridSystem, inputs: Mapping[str, Signal | float]) -> list[Signal]:
+    require_known(inputs, [quantity.name for quantity in system.inputs], "input")
+    given = {
+        name: Constant(value=float(value)) if isinstance(value, int | float) else value
+        for name, value in inputs.items()
+    }
+    return [given.get(quantity.name, Constant(value=0.0)) for quantity in system.inputs]

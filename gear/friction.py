@@ -1,0 +1,55 @@
+"""Friction coefficients of a gear mesh as functions of mesh speed and normal force."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from gear.quantities import Coefficient, check
+
+
+class FrictionLaw(Protocol):
+    """What a mesh asks of its friction law; the direction of motion is the mesh's business, not the law's."""
+
+    def coefficient(self, speed: float, force: float) -> float:
+        """Sliding coefficient [-] at mesh speed >= 0 [m/s] under normal force >= 0 [N]."""
+        ...
+
+    def breakaway(self, force: float) -> float:
+        """Largest coefficient [-] that holds the mesh at rest under normal force >= 0 [N]."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Coulomb:
+    """Constant sliding friction with its own breakaway value.
+
+        mu(v) = sliding for v > 0,    mu(0) = static
+
+    Parameters
+    ----------
+    sliding, static : float
+        Coefficients while sliding and at breakaway [-], sliding <= static. The other order has no
+        consistent solution at breakaway (a contact that lets go would be held harder than before).
+
+    References
+    ----------
+    F. L. J. van der Linden, "Modeling of geared positioning systems", eq. (34).
+    """
+
+    sliding: Coefficient
+    static: Coefficient
+
+    def __post_init__(self) -> None:
+        check(self)
+        if self.static < self.sliding:
+            raise ValueError(
+                f"Coulomb needs sliding <= static, got sliding={self.sliding:g} and static={self.static:g}; "
+                "a breakaway coefficient below the sliding one has no consistent motion at standstill"
+            )
+
+    def coefficient(self, speed: float, force: float) -> float:
+        """Sliding coefficient [-], the same at every speed and force."""
+        return self.sliding
+
+    def breakaway(self, force: float) -> float:
+        """Coefficient [-] that holds the mesh at rest."""
+        return self.static

@@ -1,0 +1,110 @@
+"""A gear mesh: three terminals (wheel A, wheel B, carrier), elastic, with friction that sticks."""
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import casadi as ca
+
+from gear.elasticity import Backlash, Linear
+from gear.friction import Coulomb
+from gear.geometry import ExternalPair, GivenPair
+
+MESH_SPEED_NOMINAL = 1e-2  # m/s
+
+
+class BearingForce(NamedTuple):
+    """Planar force [N] of a mesh on wheel B; on wheel A it is the opposite. x runs from A to B."""
+
+    x: float  # along the line of centers
+    y: float  # perpendicular to it, positive to the left of x
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mesh:
+    """The contact between two wheels, with angles counted counter-clockwise for both.
+
+        x_A =  r_A (phi_A - phi_G)               travel of each wheel through the pitch point
+        x_B = -r_B (phi_B - phi_G)
+        deflection = x_A - x_B,   speed v = (x_A' + x_B')/2
+        T_A = -F_n l_A - s e_A,   T_B = -F_n l_B + s e_B,   T_G = -(T_A + T_B)
+
+    F_n comes from the elasticity law, s is the friction scalar; the mode says which law s follows:
+
+        mode      s                              left when                       for
+        STUCK     what keeps dv/dt = 0           static |F_n| - |s| falls to 0   FORWARD or BACKWARD
+        FORWARD   +mu(v) |F_n|                   v falls to 0                    STUCK or BACKWARD
+        BACKWARD  -mu(-v) |F_n|                  -v falls to 0                   STUCK or FORWARD
+        FREE      0 (and F_n = 0, in the gap)    a flank engages                 one of the others
+
+    Parameters
+    ----------
+    a, b : str
+        Names of the shafts of wheel A and wheel B.
+    carrier : str or None
+        Name of the shaft that carries the line of centers; None for the housing.
+    pair : ExternalPair or GivenPair
+        Radii and averaged friction arms.
+    elasticity : Linear or Backlash
+        Normal force from deflection and its rate.
+    friction : Coulomb
+        Friction coefficients.
+    stick_by : "mesh speed" or "conjugate speed"
+        The speed that friction opposes and that is zero while stuck: v as above, or
+        u = e_A (phi_A' - phi_G') - e_B (phi_B' - phi_G'), for which friction never does positive work.
+
+    References
+    ----------
+    F. L. J. van der Linden, "Modeling of geared positioning systems", eqs. (1)-(11), (32)-(33), Table 2,
+    with signs made consistent by energy and moment balance.
+    """
+
+    a: str
+    b: str
+    carrier: str | None = None
+    pair: ExternalPair | GivenPair
+    elasticity: Linear | Backlash
+    friction: Coulomb
+    stick_by: Literal["mesh speed", "conjugate speed"] = "mesh speed"
+
+    def __post_init__(self) -> None:
+        if len({self.a, self.b, self.carrier}) < 3:
+            raise ValueError(f"Mesh needs three different shafts, got a={self.a!r}, b={self.b!r}, carrier={self.carrier!r}")
+        if self.stick_by not in ("mesh speed", "conjugate speed"):
+            raise ValueError(f'Mesh.stick_by must be "mesh speed" or "conjugate speed", got {self.stick_by!r}')
+
+    def _per_shaft(self, a: float, b: float) -> dict[str, float]:
+        """Coefficients on the absolute motion of the shafts, from those on the motion relative to the carrier."""
+        return {self.a: a, self.b: b} | ({} if self.carrier is None else {self.carrier: -(a + b)})
+
+    def deflection_per_shaft(self) -> dict[str, float]:
+        """Deflection [m] per angle [rad] of each shaft."""
+        return self._per_shaft(self.pair.radius_a, self.pair.radius_b)
+
+    def slip_per_shaft(self) -> dict[str, float]:
+        """Speed that friction opposes [m/s] per speed [rad/s] of each shaft, by `stick_by`."""
+        if self.stick_by == "conjugate speed":
+            return self._per_shaft(self.pair.friction_arm_a, -self.pair.friction_arm_b)
+        return self._per_shaft(self.pair.radius_a / 2, -self.pair.radius_b / 2)
+
+    def torque_per_normal(self) -> dict[str, float]:
+        """Torque [N m] on each shaft per normal force [N]: the base radii, T_A = -F_n l_A, T_B = -F_n l_B."""
+        cosine = ca.cos(self.pair.pressure_angle)
+        return self._per_shaft(-self.pair.radius_a * cosine, -self.pair.radius_b * cosine)
+
+    def torque_per_friction(self) -> dict[str, float]:
+        """Torque [N m] on each shaft per friction scalar [N]: T_A = -s e_A, T_B = +s e_B."""
+        return self._per_shaft(-self.pair.friction_arm_a, self.pair.friction_arm_b)
+
+    def bearing_force(self, normal: float, friction: float, flank: float) -> BearingForce:
+        """Planar load [N] on the bearing of wheel B from signed normal force and friction scalar.
+
+            F_B = |F_n| (sin alpha, flank cos alpha) + s d_F (flank cos alpha, -sin alpha)
+
+        Whichever flank is loaded, the axes are pushed apart.
+        """
+        sine, cosine = ca.sin(self.pair.pressure_angle), ca.cos(self.pair.pressure_angle)
+        tangential = friction * self.pair.friction_factor
+        return BearingForce(
+            x=flank * normal * sine + flank * tangential * cosine,
+            y=normal * cosine - tangential * sine,
+        )

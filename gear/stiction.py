@@ -1,0 +1,178 @@
+"""The joint decision: which contacts hold, and which let go, when several are at rest together.
+
+Contacts are numbered k = 1..K. Each has a slip speed v_k and transmits one friction scalar s_k; with all
+other forces known the slip accelerations are linear in the friction scalars:
+
+    a = demand - G s            G: slip acceleration taken away per unit of friction, positive diagonal
+
+A contact at rest has three possibilities, and all contacts at rest must find theirs together:
+
+    holds           a_k = 0 and |s_k| <= static_k
+    slips           s_k = +-sliding_k and a_k has that sign           (sliding_k <= static_k)
+    holds, at limit a_k = 0 because others hold it, s_k = +-static_k  (only where contacts are redundant)
+
+This is a complementarity problem with boxes. It is solved by an active-set method in a fixed number of
+sweeps (so that it can be compiled and differentiated): first all contacts hold with their static limits;
+whatever exceeds its limit and can move is broken loose, falls to its sliding limit, and the rest is asked
+again. Contacts are redundant where several lock the same shafts (two bearings and the mesh between them);
+their friction is then not unique, and the smallest friction that does the job (least squares, weighted by G)
+is taken.
+
+References
+----------
+D. E. Stewart, "Rigid-body dynamics with friction and impact", SIAM Review 42 (2000), section 5;
+M. Hintermueller, K. Ito, K. Kunisch, "The primal-dual active set strategy", SIAM J. Optim. 13 (2002).
+"""
+
+from typing import NamedTuple
+
+import casadi as ca
+
+STUCK, FORWARD, BACKWARD, AT_LIMIT = 0, 1, -1, 2  # motion of a contact; AT_LIMIT is +2 or -2
+
+REGULARIZATION = 1e-8  # of G where contacts are redundant; refined away, see `friction`
+REFINEMENTS = 2  # each takes the leftover acceleration down by REGULARIZATION
+INDEPENDENT = 1e-5  # a contact can slip by itself if the others leave this part of its own 1/inertia
+RELEASED = 1 - 1e-6  # a contact that has just let go is not to hold again at the very same limit
+
+
+def friction(compliance: ca.SX, demand: ca.SX, held: ca.SX, given: ca.SX, redundant: bool) -> ca.SX:
+    """Friction scalars: those of `held` contacts from a = 0, the others as `given`.
+
+    Parameters
+    ----------
+    compliance, demand : SX, (K, K) and (K, 1)
+        G and the slip acceleration without any contact friction.
+    held, given : SX, (K, 1)
+        1 where the contact holds, else 0; friction scalar where it does not hold.
+    redundant : bool
+        Whether held contacts may lock the same shafts. G is then singular; it is regularized, which gives
+        the smallest friction, and the error in the acceleration is taken out again by refinement.
+    """
+    count = demand.shape[0]
+    shift = REGULARIZATION if redundant else 0.0
+    lower, upper = _factorize(
+        [
+            [
+                ca.if_else(held[i], compliance[i, j] * (1 + shift if i == j else 1), 1.0 if i == j else 0.0)
+                for j in range(count)
+            ]
+            for i in range(count)
+        ]
+    )
+    solution = _substitute(lower, upper, ca.if_else(held, demand, given))
+    for _ in range(REFINEMENTS if redundant else 0):
+        solution += _substitute(lower, upper, held * (demand - compliance @ solution))
+    return solution
+
+
+def _factorize(rows: list[list[ca.SX]]) -> tuple[dict, list[list[ca.SX]]]:
+    """LU factors without pivoting: all principal minors of G are positive, and chains of contacts stay banded."""
+    rows, lower = [list(row) for row in rows], {}
+    for pivot in range(len(rows)):
+        for i in range(pivot + 1, len(rows)):
+            if not ca.SX(rows[i][pivot]).is_zero():
+                lower[i, pivot] = rows[i][pivot] / rows[pivot][pivot]
+                for j in range(pivot + 1, len(rows)):
+                    rows[i][j] = rows[i][j] - lower[i, pivot] * rows[pivot][j]
+    return lower, rows
+
+
+def _substitute(lower: dict, upper: list[list[ca.SX]], right: ca.SX) -> ca.SX:
+    solution = [right[i] for i in range(right.shape[0])]
+    for i in range(len(solution)):
+        for j in range(i):
+            if (i, j) in lower:
+                solution[i] = solution[i] - lower[i, j] * solution[j]
+    for i in reversed(range(len(solution))):
+        for j in range(i + 1, len(solution)):
+            solution[i] = solution[i] - upper[i][j] * solution[j]
+        solution[i] = solution[i] / upper[i][i]
+    return ca.vertcat(*solution)
+
+
+class RestProblem(NamedTuple):
+    """What the joint decision is about; all (K, 1) except `compliance` (K, K)."""
+
+    compliance: ca.SX  # G
+    demand: ca.SX  # slip acceleration without contact friction
+    static: ca.SX  # friction limit at rest, >= 0
+    sliding: ca.SX  # friction limit at the onset of sliding, 0 <= sliding <= static
+    rest: ca.SX  # 1 where the slip speed is zero and the contact takes part in the decision
+    given: ca.SX  # friction scalar of the contacts that do not
+    released: ca.SX  # 1 where the contact has just let go
+
+
+class Decision(NamedTuple):
+    """`motion` per contact at rest (STUCK, +-1 slips, +-AT_LIMIT) and whether the sweeps agreed (else 1)."""
+
+    motion: ca.MX
+    fault: ca.MX
+
+
+def decide(problem: RestProblem, redundant: bool) -> Decision:
+    """Decide all contacts at rest together; see the module's text for the rules.
+
+    The arguments may be SX or MX of the sizes given in `RestProblem`; the result is MX. `fault` is 1 where
+    no consistent combination was found within the fixed number of sweeps.
+    """
+    count = problem.demand.shape[0]
+    sweep = _sweep_function(count, redundant)
+    status, broken = ca.MX.zeros(count), problem.released
+    sweeps = 4 * count + 2
+    for number in range(sweeps):
+        # every violator at once is fast; one at a time cannot cycle (K. G. Murty, 1974), so it comes last
+        status, broken, motion, settled = sweep(status, broken, number > sweeps // 2, *problem)
+    _, _, _, settled = sweep(status, broken, True, *problem)
+    return Decision(motion, 1 - settled)
+
+
+def _sweep_function(count: int, redundant: bool) -> ca.Function:
+    """One active-set sweep; `status` is 0 for holding and +-1 for at the limit in that direction."""
+    vector = [ca.SX.sym(name, count) for name in ("status", "broken")]
+    status, broken = vector
+    single = ca.SX.sym("single")
+    problem = RestProblem(
+        ca.SX.sym("compliance", count, count),
+        *(ca.SX.sym(name, count) for name in ("demand", "static", "sliding", "rest", "given", "released")),
+    )
+    limit = ca.if_else(broken, problem.sliding * ca.if_else(problem.released, RELEASED, 1), problem.static)
+    held = problem.rest * ca.eq(status, 0)
+    force = friction(
+        problem.compliance,
+        problem.demand,
+        held,
+        ca.if_else(problem.rest, status * limit, problem.given),
+        redundant,
+    )
+    acceleration = problem.demand - problem.compliance @ force
+    exceeds = ca.if_else(ca.fabs(force) > limit, ca.sign(force), 0)
+    stays = ca.if_else(status * acceleration < 0, 0, status)
+    proposal = problem.rest * ca.if_else(ca.eq(status, 0), exceeds, stays)
+
+    first, found = [], 0
+    for k in range(count):
+        differs = ca.logic_not(ca.eq(proposal[k], status[k]))
+        first.append(ca.if_else(ca.logic_and(single, found), status[k], proposal[k]))
+        found = ca.logic_or(found, differs)
+    settled = ca.logic_not(found)
+
+    slips = ca.fabs(status) * (_can_slip(problem.compliance, held) if redundant else 1)
+    loosened = ca.if_else(settled, ca.fmax(broken, slips), broken)
+    motion = status * ca.if_else(slips, 1, AT_LIMIT)
+    done = ca.logic_and(settled, ca.logic_not(ca.sum1(ca.fabs(loosened - broken))))
+    return ca.Function(
+        "sweep", [status, broken, single, *problem], [ca.vertcat(*first), loosened, motion, done], {"never_inline": True}
+    )
+
+
+def _can_slip(compliance: ca.SX, held: ca.SX) -> ca.SX:
+    """1 for contacts that could move although all `held` ones hold (Schur complement of G)."""
+    count = compliance.shape[0]
+    shifted = compliance * (1 + REGULARIZATION * ca.SX.eye(count))
+    result = []
+    for k in range(count):
+        taken = friction(shifted, compliance[:, k], held, ca.SX.zeros(count), False)
+        left = compliance[k, k] - (compliance[k, :] * held.T) @ taken
+        result.append(left > INDEPENDENT * compliance[k, k])
+    return ca.vertcat(*result)

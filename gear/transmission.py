@@ -1,0 +1,207 @@
+"""A transmission: shafts joined by meshes and couplings and carried by bearings."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from gear.mesh import MESH_SPEED_NOMINAL, Mesh
+from gear.shafts import Bearing, Coupling, Shaft
+
+BEARING_SPEED_NOMINAL = 1.0  # rad/s
+BEARING_TORQUE_FLOOR = 1e-3  # N m; keeps the scale of a frictionless bearing finite
+
+
+class Contact(NamedTuple):
+    """A place where friction can stick, as the joint decision sees it."""
+
+    name: str  # path of the mesh or bearing in the transmission
+    slip: dict[str, float]  # slip speed per shaft speed
+    torque: dict[str, float]  # torque on each shaft per friction scalar
+    speed_nominal: float  # a usual slip speed
+    force_nominal: float  # a usual friction limit
+
+
+@dataclass(frozen=True, kw_only=True)
+class Transmission:
+    """Shafts, the meshes and couplings between them, and their bearings.
+
+    With stiff bearings the planar mechanics of any gear set is this graph: a mesh has three terminals
+    (two wheels and the carrier of their line of centers), everything else has one or two.
+
+    Parameters
+    ----------
+    shafts : mapping of str to Shaft
+        By name; the order is the order of the states.
+    meshes, couplings, bearings : mapping of str to Mesh, Coupling, Bearing
+        By name; they refer to shafts by name.
+    input, output : str
+        Names of the shafts on which the motor and the load act.
+
+    Raises
+    ------
+    ValueError
+        Where a name is unknown (with the valid ones), a shaft is connected to nothing, or a mesh cannot
+        stick by mesh speed because its stuck inertia would not be positive.
+    """
+
+    shafts: Mapping[str, Shaft]
+    meshes: Mapping[str, Mesh] = field(default_factory=dict)
+    bearings: Mapping[str, Bearing] = field(default_factory=dict)
+    couplings: Mapping[str, Coupling] = field(default_factory=dict)
+    input: str
+    output: str
+
+    def __post_init__(self) -> None:
+        for what, name in [("input", self.input), ("output", self.output), *self._references()]:
+            if name not in self.shafts:
+                raise ValueError(f"Transmission.{what} names shaft {name!r}; the shafts are {', '.join(self.shafts)}")
+        for name, mesh in self.meshes.items():
+            _require_positive_stuck_inertia(name, mesh, {shaft: part.inertia for shaft, part in self.shafts.items()})
+        self.ratio()
+
+    def _references(self) -> list[tuple[str, str]]:
+        found = []
+        for kind in ("meshes", "couplings", "bearings"):
+            for name, part in getattr(self, kind).items():
+                for terminal in ("a", "b", "carrier", "shaft"):
+                    shaft = getattr(part, terminal, None)
+                    if shaft is not None:
+                        found.append((f"{kind}.{name}.{terminal}", shaft))
+        return found
+
+    def contacts(self) -> list[Contact]:
+        """Every place that can stick, along the shafts, so that neighbors in the list are neighbors in the train."""
+        found = []
+        for shaft in self.shafts:
+            found += [
+                Contact(
+                    f"bearings.{name}",
+                    {shaft: 1.0},
+                    {shaft: -1.0},
+                    BEARING_SPEED_NOMINAL,
+                    ca.fmax(bearing.breakaway, BEARING_TORQUE_FLOOR),
+                )
+                for name, bearing in self.bearings.items()
+                if bearing.shaft == shaft
+            ]
+            found += [
+                Contact(
+                    f"meshes.{name}",
+                    mesh.slip_per_shaft(),
+                    mesh.torque_per_friction(),
+                    MESH_SPEED_NOMINAL,
+                    mesh.elasticity.nominal_force,
+                )
+                for name, mesh in self.meshes.items()
+                if mesh.a == shaft
+            ]
+        return found
+
+    def redundant(self) -> bool:
+        """Whether several contacts can lock the same shafts, so that their friction is not unique."""
+        rows = self._matrix([contact.slip for contact in self.contacts()])
+        return np.linalg.matrix_rank(rows) < len(rows)
+
+    def ratio(self) -> float:
+        """Turns of the input shaft per turn of the output shaft, all teeth and couplings rigid.
+
+        Raises
+        ------
+        ValueError
+            Where input and output are not joined by a single-valued ratio.
+        """
+        rigid = [mesh.deflection_per_shaft() for mesh in self.meshes.values()]
+        rigid += [{coupling.a: 1.0, coupling.b: -1.0} for coupling in self.couplings.values()]
+        names = list(self.shafts)
+        motions = _null_space(self._matrix(rigid)) if rigid else np.eye(len(names))
+        ends = motions[[names.index(self.input), names.index(self.output)]]
+        if np.linalg.matrix_rank(ends, tol=1e-9) != 1 or abs(ends[1]).max() < 1e-9:
+            raise ValueError(
+                f"Transmission: shafts {self.input!r} (input) and {self.output!r} (output) are not joined by one speed "
+                "ratio; every shaft between them needs a mesh or a coupling, and a carrier its own connection"
+            )
+        column = int(abs(ends[1]).argmax())
+        return float(ends[0, column] / ends[1, column])
+
+    def _matrix(self, rows: list[dict[str, float]]) -> np.ndarray:
+        """Coefficients per shaft as a matrix, each row scaled to one."""
+        table = np.array([[float(row.get(name, 0.0)) for name in self.shafts] for row in rows])
+        return table / np.linalg.norm(table, axis=1, keepdims=True) if rows else np.zeros((0, len(self.shafts)))
+
+    def deflections(self, motion: Mapping[str, float]) -> dict[str, float]:
+        """Deflection of each mesh [m], or its rate [m/s], from the angles or speeds of the shafts."""
+        return {
+            name: sum(factor * motion[shaft] for shaft, factor in mesh.deflection_per_shaft().items())
+            for name, mesh in self.meshes.items()
+        }
+
+    def normal_forces(self, angle: Mapping, speed: Mapping, flank: Mapping[str, float]) -> dict[str, float]:
+        """Signed normal force [N] of each mesh on its present flank."""
+        deflection, rate = self.deflections(angle), self.deflections(speed)
+        return {
+            name: mesh.elasticity.force(deflection[name], rate[name], flank[name]) for name, mesh in self.meshes.items()
+        }
+
+    def torques(self, angle: Mapping, speed: Mapping, normal: Mapping[str, float]) -> dict[str, float]:
+        """Torque on each shaft [N m] from teeth, couplings and viscous drag, without what can stick."""
+        torque = dict.fromkeys(self.shafts, 0.0)
+        for name, mesh in self.meshes.items():
+            for shaft, arm in mesh.torque_per_normal().items():
+                torque[shaft] += arm * normal[name]
+        for coupling in self.couplings.values():
+            passed = coupling.stiffness * (angle[coupling.a] - angle[coupling.b]) + coupling.damping * (
+                speed[coupling.a] - speed[coupling.b]
+            )
+            torque[coupling.a] -= passed
+            torque[coupling.b] += passed
+        for bearing in self.bearings.values():
+            torque[bearing.shaft] -= bearing.viscous * speed[bearing.shaft]
+        return torque
+
+    def friction_limits(self, normal: Mapping[str, float], slip: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+        """Per contact the friction limit at rest and the friction while sliding at `slip` >= 0, both >= 0."""
+        limits = {}
+        for name, mesh in self.meshes.items():
+            force = ca.fabs(normal[name])
+            path = f"meshes.{name}"
+            limits[path] = (
+                mesh.friction.breakaway(force) * force,
+                mesh.friction.coefficient(slip[path], force) * force,
+            )
+        for name, bearing in self.bearings.items():
+            limits[f"bearings.{name}"] = (bearing.breakaway, bearing.coulomb)
+        return limits
+
+    def elastic_energy(self, angle: Mapping, flank: Mapping[str, float]) -> float:
+        """Energy [J] stored in teeth and couplings.
+
+        The deflection is measured on the pitch circle and the force acts along the line of action, so a
+        mesh stores cos(alpha) times the integral of its force law.
+        """
+        stored = 0.0
+        for name, deflection in self.deflections(angle).items():
+            mesh = self.meshes[name]
+            stored += ca.cos(mesh.pair.pressure_angle) * mesh.elasticity.energy(deflection, flank[name])
+        for coupling in self.couplings.values():
+            stored += coupling.stiffness * (angle[coupling.a] - angle[coupling.b]) ** 2 / 2
+        return stored
+
+
+def _require_positive_stuck_inertia(name: str, mesh: Mesh, inertia: Mapping[str, float]) -> None:
+    slip, torque = mesh.slip_per_shaft(), mesh.torque_per_friction()
+    mobility = -sum(float(slip[shaft] * torque[shaft]) / inertia[shaft] for shaft in slip)
+    if mobility <= 0:
+        raise ValueError(
+            f'Transmission: mesh {name!r} cannot stick by "mesh speed": its friction would speed up the slip it opposes '
+            f"({-mobility:.4g} m/s^2 per N with the inertias given); use stick_by='conjugate speed'"
+        )
+
+
+def _null_space(matrix: np.ndarray) -> np.ndarray:
+    """Orthonormal motions that leave every row of `matrix` at zero, one per column."""
+    _, values, rows = np.linalg.svd(matrix)
+    rank = int((values > 1e-9 * values.max()).sum())
+    return rows[rank:].T

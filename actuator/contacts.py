@@ -7,7 +7,7 @@ import casadi as ca
 
 from actuator.hybrid import MARGIN_BAND
 from gear.elasticity import DEFLECTION_NOMINAL
-from gear.stiction import RestProblem, decide, friction
+from gear.stiction import AT_LIMIT, RestProblem, decide, friction
 from gear.transmission import Contact, Transmission
 
 REST_SPEED = 10 * MARGIN_BAND  # part of a contact's usual slip speed that counts as standing still
@@ -60,10 +60,9 @@ class ContactMechanics:
 
     def modes(self, m: ca.SX) -> ContactModes:
         """The mode variables from the vector m; rounding is taken off here, once."""
-        tidy = [ca.if_else(ca.fabs(m[k]) < 0.5, 0, m[k]) for k in range(m.shape[0])]  # noqa: PLR2004
+        whole = [ca.sign(m[k]) * ((ca.fabs(m[k]) > 0.5) + (ca.fabs(m[k]) > 1.5)) for k in range(m.shape[0])]  # noqa: PLR2004
         count = len(self.contacts)
-        flanks = [ca.sign(value) for value in tidy[count:]]
-        return ContactModes(ca.vertcat(*tidy[:count]), dict(zip(self.gear.meshes, flanks, strict=True)))
+        return ContactModes(ca.vertcat(*whole[:count]), dict(zip(self.gear.meshes, whole[count:], strict=True)))
 
     def slip_speeds(self, speed: Mapping[str, ca.SX]) -> ca.SX:
         """Slip speed of each contact."""
@@ -79,7 +78,7 @@ class ContactMechanics:
         demand = ca.vertcat(*(sum(c * free[shaft] for shaft, c in contact.slip.items()) for contact in self.contacts))
         compliance = self.compliance()
         static, sliding = self.limits(normal, direction * slip, modes)
-        at_limit = ca.fabs(modes.motion) > 1.5  # noqa: PLR2004
+        at_limit = ca.eq(ca.fabs(modes.motion), AT_LIMIT)
         given = direction * ca.if_else(at_limit, static, sliding)
         held = ca.eq(direction, 0) * self._engaged(modes)
         scalar = friction(compliance, demand, held, given, self.redundant)

@@ -138,14 +138,11 @@ def _sweep_function(count: int, redundant: bool) -> ca.Function:
     )
     limit = ca.if_else(broken, problem.sliding * ca.if_else(problem.released, RELEASED, 1), problem.static)
     held = problem.rest * ca.eq(status, 0)
-    force = friction(
-        problem.compliance,
-        problem.demand,
-        held,
-        ca.if_else(problem.rest, status * limit, problem.given),
-        redundant,
-    )
-    acceleration = problem.demand - problem.compliance @ force
+    # the regularized problem as it is, not refined: it alone has one solution for the sweeps to settle on
+    compliance = problem.compliance * (1 + REGULARIZATION * ca.SX.eye(count)) if redundant else problem.compliance
+    given = ca.if_else(problem.rest, status * limit, problem.given)
+    force = friction(compliance, problem.demand, held, given, redundant=False)
+    acceleration = problem.demand - compliance @ force
     exceeds = ca.if_else(ca.fabs(force) > limit, ca.sign(force), 0)
     stays = ca.if_else(status * acceleration < 0, 0, status)
     proposal = problem.rest * ca.if_else(ca.eq(status, 0), exceeds, stays)
@@ -157,7 +154,7 @@ def _sweep_function(count: int, redundant: bool) -> ca.Function:
         found = ca.logic_or(found, differs)
     settled = ca.logic_not(found)
 
-    slips = ca.fabs(status) * (_can_slip(problem.compliance, held) if redundant else 1)
+    slips = ca.fabs(status) * (_can_slip(compliance, held) if redundant else 1)
     loosened = ca.if_else(settled, ca.fmax(broken, slips), broken)
     motion = status * ca.if_else(slips, 1, AT_LIMIT)
     done = ca.logic_and(settled, ca.logic_not(ca.sum1(ca.fabs(loosened - broken))))
@@ -169,10 +166,9 @@ def _sweep_function(count: int, redundant: bool) -> ca.Function:
 def _can_slip(compliance: ca.SX, held: ca.SX) -> ca.SX:
     """1 for contacts that could move although all `held` ones hold (Schur complement of G)."""
     count = compliance.shape[0]
-    shifted = compliance * (1 + REGULARIZATION * ca.SX.eye(count))
     result = []
     for k in range(count):
-        taken = friction(shifted, compliance[:, k], held, ca.SX.zeros(count), False)
+        taken = friction(compliance, compliance[:, k], held, ca.SX.zeros(count), redundant=False)
         left = compliance[k, k] - (compliance[k, :] * held.T) @ taken
         result.append(left > INDEPENDENT * compliance[k, k])
     return ca.vertcat(*result)

@@ -135,6 +135,7 @@ class _Assembly:
             outputs=tuple(Quantity(name, unit) for name, (unit, _) in self.outputs.items()),
             margin_names=tuple(self.contacts.margin_names()),
             parameters=tuple(parameters),
+            travel=_travel(actuator.gear),
             flow=ca.Function("flow", arguments, [ca.vertcat(*(rates[state.name] for state in self.states))]),
             margins=ca.Function("margins", arguments, [self.contacts.margins(angle, forces, modes)]),
             reset=self._whole_reset(settle, arguments),
@@ -299,3 +300,13 @@ class _Assembly:
         count = speeds.shape[0]
         x = inputs[1]
         return ca.Function("reset", inputs, [ca.vertcat(x[: x.shape[0] - count], speeds), modes, fault])
+
+
+def _travel(gear: Transmission) -> dict[str, int]:
+    """Direction of each contact when the output moves forward."""
+    turns = gear.travel()
+    slips = {
+        f"gear.{contact.name}": sum(float(c) * turns[shaft] for shaft, c in contact.slip.items())
+        for contact in gear.contacts()
+    }
+    return {name: -1 if slip < 0 else 1 for name, slip in slips.items()}

@@ -31,7 +31,7 @@ class Quantity(NamedTuple):
     nominal: float = 1.0
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class HybridSystem:
     """Continuous states, modes, inputs, parameters and outputs, with the functions between them.
 
@@ -50,6 +50,8 @@ class HybridSystem:
         What is left when the margin falls through zero.
     parameters : tuple of Parameter
         In the order of p, with defaults.
+    travel : mapping of str to int
+        Per contact +1 or -1: the direction in which it slides when the output moves forward.
     flow, margins, reset, outputs_function : casadi.Function
         As above; `fired` is a vector with 1 at the margin that fired.
     """
@@ -61,6 +63,7 @@ class HybridSystem:
     outputs: tuple[Quantity, ...]
     margin_names: tuple[str, ...]
     parameters: tuple[Parameter, ...]
+    travel: Mapping[str, int]
     flow: ca.Function
     margins: ca.Function
     reset: ca.Function

@@ -113,6 +113,10 @@ class Transmission:
         ValueError
             Where input and output are not joined by a single-valued ratio.
         """
+        return self.travel()[self.input]
+
+    def travel(self) -> dict[str, float]:
+        """Turns of every shaft per turn of the output shaft, all teeth and couplings rigid; errors as `ratio`."""
         rigid = [mesh.deflection_per_shaft() for mesh in self.meshes.values()]
         rigid += [{coupling.a: 1.0, coupling.b: -1.0} for coupling in self.couplings.values()]
         names = list(self.shafts)
@@ -123,8 +127,8 @@ class Transmission:
                 f"Transmission: shafts {self.input!r} (input) and {self.output!r} (output) are not joined by one speed "
                 "ratio; every shaft between them needs a mesh or a coupling, and a carrier its own connection"
             )
-        column = int(abs(ends[1]).argmax())
-        return float(ends[0, column] / ends[1, column])
+        moving = motions[:, int(abs(ends[1]).argmax())]
+        return {name: float(turns) for name, turns in zip(names, moving / moving[names.index(self.output)], strict=True)}
 
     def _matrix(self, rows: list[dict[str, float]]) -> np.ndarray:
         """Coefficients per shaft as a matrix, each row scaled to one."""

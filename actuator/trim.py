@@ -1,0 +1,191 @@
+"""Operating points: states at which nothing changes, in a chosen contact mode."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import casadi as ca
+import numpy as np
+
+from actuator.actuator import Actuator
+from actuator.hybrid import HybridSystem
+from actuator.parameters import require_known
+from actuator.run import contact_names
+
+MOTIONS = {"stuck": 0, "forward": 1, "backward": -1}
+STEPS = 60  # Newton steps; the equations of a mode are nearly linear
+STILL = 1e-9  # rate of a state over its nominal size [1/s] that counts as zero
+HOLDS = -1e-6  # a margin below this does not hold
+
+
+class NoEquilibrium(ValueError):
+    """No operating point; `rates` are the rates of the states where the search ended, by name."""
+
+    def __init__(self, message: str, rates: dict[str, float]) -> None:
+        super().__init__(message)
+        self.rates = rates
+
+
+@dataclass(frozen=True, kw_only=True)
+class OperatingPoint:
+    """A state of rest, or of steady motion, of a system in one combination of contact modes.
+
+    Attributes
+    ----------
+    system : HybridSystem
+        To which it belongs.
+    x, m, u, p : ndarray
+        State, modes, inputs, parameters.
+    rates : ndarray
+        dx/dt; zero but for the states that were allowed to drift.
+    """
+
+    system: HybridSystem
+    x: np.ndarray
+    m: np.ndarray
+    u: np.ndarray
+    p: np.ndarray
+    rates: np.ndarray
+
+    @property
+    def states(self) -> dict[str, float]:
+        """States by name."""
+        return {quantity.name: float(value) for quantity, value in zip(self.system.states, self.x, strict=True)}
+
+    @property
+    def outputs(self) -> dict[str, float]:
+        """Outputs by name."""
+        values = self.system.outputs_function(self.x, self.m, self.u, self.p).full().ravel()
+        return {quantity.name: float(value) for quantity, value in zip(self.system.outputs, values, strict=True)}
+
+
+def modes_of(system: HybridSystem, contacts: str | Mapping[str, str], flanks: Mapping[str, int] | None = None) -> np.ndarray:
+    """Mode vector from words.
+
+    One word for all contacts is about the output: "stuck", or all contacts sliding as they do when the output
+    moves "forward" or "backward" (some of them backward, then). Words per contact are about its own slip
+    speed. Flanks are +1 where not given.
+    """
+    names = contact_names(system.modes)
+    if isinstance(contacts, str):
+        require_known([contacts], MOTIONS, "contact mode")
+        values = {f"{name}.motion": MOTIONS[contacts] * system.travel[name] for name in names}
+    else:
+        require_known(contacts, names, "contact")
+        require_known(contacts.values(), MOTIONS, "contact mode")
+        missing = [name for name in names if name not in contacts]
+        if missing:
+            raise KeyError(f"no mode given for contact {', '.join(missing)}; each needs stuck, forward or backward")
+        values = {f"{name}.motion": MOTIONS[word] for name, word in contacts.items()}
+    flank_names = [name for name in system.modes if name.endswith(".flank")]
+    given = {f"{name}.flank": value for name, value in (flanks or {}).items()}
+    require_known(given, flank_names, "flank")
+    return system.mode_vector(values | {name: given.get(name, 1) for name in flank_names})
+
+
+def trim(  # noqa: PLR0913 - what may be held and where to start are all choices of the user
+    plant: Actuator | HybridSystem,
+    contacts: str | Mapping[str, str],
+    *,
+    inputs: Mapping[str, float] | None = None,
+    guess: Mapping[str, float] | None = None,
+    parameters: Mapping[str, float] | None = None,
+    drifting: Sequence[str] = (),
+) -> OperatingPoint:
+    """Find the operating point of a system in the given contact modes.
+
+    In a sliding mode at speed zero, friction acts with its full sliding value in that direction: the limit
+    from which the contact starts, or to which it comes. In a stuck mode many points are at rest; the one
+    nearest to the guess is taken, or half way between the two sliding ones where no guess is given. Flanks
+    follow from the load.
+
+    Parameters
+    ----------
+    plant : Actuator or HybridSystem
+        What to trim.
+    contacts : str or mapping of str to str
+        "stuck", or the direction of the output, "forward" or "backward"; or words by contact.
+    inputs, guess, parameters : mapping of str to float
+        Constant inputs, states to start the search from, and parameters, by name.
+    drifting : sequence of str
+        States that may move steadily (the angles of a drive at constant speed); they keep their guess.
+
+    Returns
+    -------
+    OperatingPoint
+
+    Raises
+    ------
+    NoEquilibrium
+        Where there is none near the guess, with the remaining rates; or where friction cannot hold it.
+    """
+    system = plant.system() if isinstance(plant, Actuator) else plant
+    names = [quantity.name for quantity in system.states]
+    require_known(drifting, names, "state")
+    if guess is None and contacts == "stuck":
+        ends = [trim(system, word, inputs=inputs, parameters=parameters, drifting=drifting) for word in ("forward", "backward")]
+        guess = {name: (ends[0].states[name] + ends[1].states[name]) / 2 for name in names}
+    u, p, x = system.input_vector(inputs), system.parameter_values(parameters), system.state_vector(guess)
+    scale = np.array([quantity.nominal for quantity in system.states])
+    free = np.array([name not in drifting for name in names])
+    flank_names = [name.removesuffix(".flank") for name in system.modes if name.endswith(".flank")]
+    flanks = dict.fromkeys(flank_names, 1)
+    for _ in range(2 + len(flanks)):
+        m = modes_of(system, contacts, flanks)
+        x, rates = _newton(system, x, m, u, p, scale, free)
+        forces = dict(
+            zip([q.name for q in system.outputs], system.outputs_function(x, m, u, p).full().ravel(), strict=True)
+        )
+        found = {name: -1 if forces[f"{name}.normal_force"] < 0 else 1 for name in flanks}
+        if found == flanks:
+            break
+        flanks = found
+    margins = system.margins(x, m, u, p).full().ravel()
+    if margins.size and margins.min() < HOLDS:
+        raise NoEquilibrium(
+            f"{system.name}: {system.margin_names[int(margins.argmin())]} does not hold at this operating point (margin "
+            f"{margins.min():.3g} of its usual size); choose a mode in which it slides, or another load",
+            dict(zip(names, rates, strict=True)),
+        )
+    return OperatingPoint(system=system, x=x, m=m, u=u, p=p, rates=rates)
+
+
+def _newton(system: HybridSystem, x: np.ndarray, m: np.ndarray, u: np.ndarray, p: np.ndarray, scale: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Least-norm Newton steps, in states over their nominal sizes, damped until the residual falls."""
+    jacobian = _jacobian(system)
+    drifts = ~free  # a drifting state may have any constant rate
+
+    def residual(state: np.ndarray) -> np.ndarray:
+        return np.where(drifts, 0.0, system.flow(state, m, u, p).full().ravel() / scale)
+
+    rate = residual(x)
+    for _ in range(STEPS):
+        if abs(rate).max() < STILL:
+            break
+        matrix = jacobian(x, m, u, p).full() / scale[:, None] * scale[None, :]
+        rows = 1 / np.maximum(np.linalg.norm(matrix, axis=1), 1e-12)  # stiff rows would drown the others
+        step = np.zeros_like(x)
+        step[free] = np.linalg.lstsq((rows[:, None] * matrix)[np.ix_(free, free)], -(rows * rate)[free], rcond=1e-13)[0]
+        for damping in (1.0, 0.5, 0.1, 0.01):
+            trial = residual(x + damping * scale * step)
+            if np.linalg.norm(rows * trial) < np.linalg.norm(rows * rate):
+                break
+        x, rate = x + damping * scale * step, trial
+    rates = system.flow(x, m, u, p).full().ravel()
+    worst = np.argsort(-abs(rate))[:3]
+    tolerance = STILL + 1e-12 * np.linalg.norm(jacobian(x, m, u, p).full() / scale[:, None] * scale, axis=1).max()
+    if not abs(rate).max() < max(tolerance, 1e-6):
+        named = dict(zip([quantity.name for quantity in system.states], rates, strict=True))
+        text = ", ".join(f"d({system.states[i].name})/dt = {rates[i]:.4g} {system.states[i].unit}/s" for i in worst)
+        raise NoEquilibrium(
+            f"{system.name}: no equilibrium found in this contact mode; what remains is {text}. "
+            "Check the load against the torque and voltage limits, or let states that move steadily drift",
+            named,
+        )
+    return x, rates
+
+
+@lru_cache(maxsize=32)
+def _jacobian(system: HybridSystem) -> ca.Function:
+    x, m, u, p = (ca.SX.sym(name, system.flow.size1_in(i)) for i, name in enumerate(("x", "m", "u", "p")))
+    return ca.Function("jacobian", [x, m, u, p], [ca.jacobian(system.flow(x, m, u, p), x)])

@@ -200,11 +200,11 @@ class _Assembly:
         torque[gear.input] += motor_torque
         torque[gear.output] += load_torque
         self._output("motor_torque", "N m", motor_torque)
-        self._output("load_torque", "N m", load_torque)
+        self._output("total_load_torque", "N m", load_torque)
         return rates, torque
 
     def _open(self, rates: dict[str, ca.SX]) -> ca.SX:
-        return limited(self._point("torque_reference", "N m", self.u["torque_reference"]), self.parts["motor"].torque_limit)
+        return limited(self.u["torque_reference"], self.parts["motor"].torque_limit)
 
     def _pid(self, rates: dict[str, ca.SX]) -> ca.SX:
         pid, integral = self.parts["controller"], self.symbols["controller.integral"]
@@ -275,6 +275,7 @@ class _Assembly:
         for side, shaft in (("motor", gear.input), ("load", gear.output)):
             self._output(f"{side}_angle", "rad", angle[shaft])
             self._output(f"{side}_speed", "rad/s", speed[shaft])
+        self._output("motor_angle_at_load", "rad", angle[gear.input] / self.ratio)
         deflections = gear.deflections(angle)
         for k, contact in enumerate(self.contacts.contacts):
             name = contact.name.split(".")[1]

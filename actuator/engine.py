@@ -1,38 +1,23 @@
-"""The engine: runs a HybridSystem on CasADi's Rosenbrock integrator with located events.
+"""The engine: runs a HybridSystem window by window, and trusts no event it has not checked.
 
-It knows no physics. What it adds to the integrator, and why:
-
-* Time runs from 0 to 1 over a window and the window's length is a parameter, so one compiled function
-  serves every duration and resolution, and derivatives with respect to a period exist.
-* States are scaled by their nominal sizes, so the scalar tolerance means the same for each of them.
-* Modes and an event log ride along as states without dynamics, so events survive compilation. They do not
-  count in the error: the tolerance is sharpened by what they dilute.
-* An event fires only where a margin falls from positive to negative; a margin that is already negative is
-  never seen again. So every margin is looked at on every output point, and where one is negative the modes
-  are settled again from there.
-* The log holds the last LOG_SLOTS mode changes of an output interval. Where an interval had more, it is run
-  again in finer steps.
+It knows no physics. An event fires only where a margin falls from positive to negative; a margin that is
+already negative is never seen again. So every margin is looked at on every output point, and where one is
+negative the interval is run again in finer steps until the violation is pinned down, and the modes are
+settled there. Intervals with more events than the log holds are run again in finer steps too.
 """
 
-import contextlib
-import io
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
-import casadi as ca
 import numpy as np
 
 from actuator.compiled import compile_function
 from actuator.hybrid import HybridSystem
 from actuator.signals import Piece
+from actuator.window import INTERVALS, LOG_SLOTS, InputForm, ModeCode, window_function
 
-INTERVALS = 200  # output intervals of one window
-LOG_SLOTS = 3
-MODE_BASE = 5  # mode variables are -2..2; a log entry packs them as digits
-MODES_PER_CODE = 20  # 5^20 < 2^53
-EVENT_TOLERANCE = 1e-14  # part of a window
-MAX_EVENTS = 20_000  # in one window
 VIOLATION = 1e-6  # a margin below minus this is a missed event, not rounding
 FINEST_WINDOW = 1e-7  # s; a window that fails at this length is a failure of the model
 
@@ -112,149 +97,17 @@ def engine(system: HybridSystem, options: EngineOptions = EngineOptions()) -> "E
 
 
 class Engine:
-    """A system made ready to run: see the module's text for what is added to it."""
+    """A system made ready to run."""
 
     def __init__(self, system: HybridSystem, options: EngineOptions) -> None:
         self.system, self.options = system, options
-        self.nominal = np.array([state.nominal for state in system.states])
-        self.codes = -(-len(system.modes) // MODES_PER_CODE)
-        function = self._window_function()
+        self.form, self.code = InputForm(len(system.inputs), options.waves), ModeCode(len(system.modes))
+        function = window_function(system, self.form, self.code, options.tolerance)
         loaded = None if options.compiled is False else compile_function(function)
         if loaded is None and options.compiled:
             raise RuntimeError("EngineOptions.compiled=True needs a C compiler (cc, gcc or $CC); none was found")
         self.compiled = loaded is not None
         self.window = loaded or function
-
-    # -- building -------------------------------------------------------------------------------------
-
-    def _window_function(self) -> ca.Function:
-        """(x, m, p, length, signal) -> states, modes, log, outputs, margins on the output points."""
-        system = self.system
-        nx, nm, nu, n_p = len(system.states), len(system.modes), len(system.inputs), len(system.parameters)
-        y, logged = ca.SX.sym("y", nx + nm), ca.SX.sym("log", 1 + LOG_SLOTS * (1 + self.codes))
-        tau, length = ca.SX.sym("tau"), ca.SX.sym("length")
-        p, signal = ca.SX.sym("p", n_p), ca.SX.sym("signal", self._signal_size())
-        x, m = y[:nx] * ca.DM(self.nominal), y[nx:]
-        whole, everything = ca.vertcat(y, logged), ca.vertcat(p, length, signal)
-
-        u = self._input(tau * length, signal)
-        rate = length * system.flow(x, m, u, p) / ca.DM(self.nominal)
-        # what depends on the parameters alone (tooth geometry, say) is worked out once, not in every stage
-        (rate, margins), names, derived = ca.extract_parametric([rate, system.margins(x, m, u, p)], p)
-        once = ca.Function("once", [p], [ca.vertcat(*derived)])
-        everything = ca.vertcat(everything, *names)
-        dae = {
-            "t": tau,
-            "x": whole,
-            "p": everything,
-            "ode": ca.vertcat(rate, ca.SX.zeros(nm + logged.shape[0])),
-        }
-        dilution = np.sqrt(nx / whole.shape[0])
-        settings = {
-            "abstol": self.options.tolerance * dilution,
-            "reltol": self.options.tolerance * dilution * 1e-3,
-            # the interpolant between steps, on which events are located, is not under error control
-            "max_step_size": 1 / INTERVALS,
-        }
-        if system.margin_names:
-            dae["zero"] = margins
-            settings |= {
-                "transition": self._transition(whole.shape[0], everything.shape[0]),
-                "event_tol": EVENT_TOLERANCE,
-                "max_events": MAX_EVENTS,
-            }
-        grid = [k / INTERVALS for k in range(1, INTERVALS + 1)]
-        with contextlib.redirect_stderr(io.StringIO()):  # "Event support is experimental", once per integrator
-            integrator = ca.integrator("integrator", "rosenbrock", dae, 0, grid, settings)
-
-        observe = ca.Function("observe", [tau, y, p, length, signal], [system.outputs_function(x, m, u, p), system.margins(x, m, u, p)])
-        x0, m0 = ca.MX.sym("x0", nx), ca.MX.sym("m0", nm)
-        given = ca.MX.sym("p", n_p), ca.MX.sym("length"), ca.MX.sym("signal", self._signal_size())
-        start = ca.vertcat(x0 / ca.DM(self.nominal), m0, ca.DM.zeros(logged.shape[0]))
-        path = integrator(x0=start, p=ca.vertcat(*given, once(given[0])))["xf"]
-        points = ca.horzcat(start, path)
-        times = ca.DM([0.0, *grid]).T
-        outputs, margins = observe.map(INTERVALS + 1)(times, points[: nx + nm, :], *(ca.repmat(g, 1, INTERVALS + 1) for g in given))
-        return ca.Function(
-            "window",
-            [x0, m0, *given],
-            [points[:nx, :] * ca.repmat(ca.DM(self.nominal), 1, INTERVALS + 1), points[nx : nx + nm, :], points[nx + nm :, :], outputs, margins],
-        )
-
-    def _signal_size(self) -> int:
-        return len(self.system.inputs) * (2 + 2 * self.options.waves) + 3 * self.options.waves
-
-    def _input(self, time: ca.SX, signal: ca.SX) -> ca.SX:
-        """u(t) from its coefficients: offset, slope, and per wave a sine and a cosine amplitude."""
-        nu, waves = len(self.system.inputs), self.options.waves
-        u = signal[:nu] + signal[nu : 2 * nu] * time
-        for k in range(waves):
-            sines, cosines = (signal[(2 + 2 * k + j) * nu : (3 + 2 * k + j) * nu] for j in (0, 1))
-            phase, frequency, rate = ca.vertsplit(signal[(2 + 2 * waves) * nu + 3 * k :][:3])
-            angle = phase + frequency * time + rate * time**2 / 2
-            u += sines * ca.sin(angle) + cosines * ca.cos(angle)
-        return u
-
-    def signal_coefficients(self, pieces: list[Piece]) -> np.ndarray:
-        """Coefficients of `_input` from one piece per input."""
-        nu, count = len(self.system.inputs), self.options.waves
-        shapes = sorted({(wave.frequency, wave.rate) for piece in pieces for wave in piece.waves})
-        if len(shapes) > count:
-            raise ValueError(f"the inputs have {len(shapes)} different waves at once, the engine was built for {count}")
-        vector = np.zeros(self._signal_size())
-        for i, piece in enumerate(pieces):
-            vector[i], vector[nu + i] = piece.offset, piece.slope
-            for wave in piece.waves:
-                k = shapes.index((wave.frequency, wave.rate))
-                vector[(2 + 2 * k) * nu + i] += wave.amplitude * np.cos(wave.phase)
-                vector[(3 + 2 * k) * nu + i] += wave.amplitude * np.sin(wave.phase)
-        for k, (frequency, rate) in enumerate(shapes):
-            vector[(2 + 2 * count) * nu + 3 * k : (2 + 2 * count) * nu + 3 * k + 3] = 0.0, frequency, rate
-        return vector
-
-    def _transition(self, size: int, size_p: int) -> ca.Function:
-        system = self.system
-        nx, nm, n_p = len(system.states), len(system.modes), len(system.parameters)
-        index, tau, whole = ca.MX.sym("index"), ca.MX.sym("tau"), ca.MX.sym("whole", size)
-        everything = ca.MX.sym("everything", size_p)
-        p, length, signal = everything[:n_p], everything[n_p], everything[n_p + 1 : n_p + 1 + self._signal_size()]
-        x, m, logged = whole[:nx] * ca.DM(self.nominal), whole[nx : nx + nm], whole[nx + nm :]
-        fired = ca.vertcat(*(ca.fabs(index - k) < 0.5 for k in range(len(system.margin_names))))  # noqa: PLR2004
-        u = ca.Function("input", [t := ca.SX.sym("t"), s := ca.SX.sym("s", signal.shape[0])], [self._input(t, s)])(
-            tau * length, signal
-        )
-        state, modes, fault = system.reset(fired, x, m, u, p)
-        # newest entry first: count, times, codes; a fault marks its entry by a negative time
-        codes = self._packed(modes)
-        entries = [ca.if_else(fault, -1.0, tau), *codes]
-        shifted = [logged[0] + 1]
-        for column, newest in enumerate(entries):
-            shifted += [newest, logged[1 + column * LOG_SLOTS : (column + 1) * LOG_SLOTS]]
-        post = ca.vertcat(state / ca.DM(self.nominal), modes, *shifted)
-        return ca.Function(
-            "transition",
-            {"index": index, "t": tau, "x": whole, "p": everything, "post_x": post},
-            ca.event_in(),
-            ca.event_out(),
-        )
-
-    def _packed(self, modes: ca.MX) -> list[ca.MX]:
-        count = len(self.system.modes)
-        groups = [modes[k : min(k + MODES_PER_CODE, count)] for k in range(0, count, MODES_PER_CODE)]
-        return [
-            ca.sum1((group + 2) * ca.DM([float(MODE_BASE**i) for i in range(group.shape[0])])) for group in groups
-        ]
-
-    def _unpacked(self, codes: np.ndarray) -> tuple[int, ...]:
-        modes: list[int] = []
-        for code in codes:
-            rest = int(round(code))
-            for _ in range(min(MODES_PER_CODE, len(self.system.modes) - len(modes))):
-                rest, digit = divmod(rest, MODE_BASE)
-                modes.append(digit - 2)
-        return tuple(modes)
-
-    # -- running --------------------------------------------------------------------------------------
 
     def settle(self, time: float, x: np.ndarray, m: np.ndarray, u: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """State and modes after a consistent decision of all modes from the continuous state.
@@ -277,7 +130,7 @@ class Engine:
             return self.run(start, end - start, x, m, p, [piece.after(start - time) for piece in pieces])
 
         try:
-            raw = [array.full() for array in self.window(x, m, p, length, self.signal_coefficients(pieces))]
+            raw = [array.full() for array in self.window(x, m, p, length, self.form.coefficients(pieces))]
             failure = None if all(np.isfinite(array).all() for array in raw) else "the state is no longer finite"
         except RuntimeError as error:
             raw, failure = [], str(error).strip().splitlines()[-1]
@@ -287,39 +140,44 @@ class Engine:
             first = part(time, time + length / 2, x, m)
             return join([first, part(time + length / 2, time + length, *first.end)])
 
-        states, modes, logged, outputs, margins = raw
-        modes, grid = np.round(modes), time + length * np.arange(INTERVALS + 1) / INTERVALS
+        states, modes, count, times, codes, outputs, margins = raw
+        grid = time + length * np.arange(INTERVALS + 1) / INTERVALS
         window = Window(grid, states, modes, outputs, margins, [], 0)
-        counts = np.diff(logged[0])
         missed = np.flatnonzero((margins < -VIOLATION).any(axis=0))
-        crowded = np.flatnonzero(counts > LOG_SLOTS)
-        trouble = min([*(missed[:1] - 1), *crowded[:1]], default=INTERVALS)
+        good = int(missed[0]) - 1 if missed.size else INTERVALS
         events = []
-        for k in np.flatnonzero(counts[: max(trouble, 0)]):
-            events += self._logged(time, length, logged[:, k + 1], int(counts[k]))
-        if trouble == INTERVALS:
-            return window._replace(events=events)
-        if trouble < 0 or length / INTERVALS < FINEST_WINDOW:
-            # the violation is pinned down: settle the modes on the first point that shows it
-            k = trouble + 1
-            u = np.array([piece(grid[k] - time) for piece in pieces])
-            state, settled = self.settle(grid[k], states[:, k], modes[:, k], u, p)
-            if np.array_equal(settled, modes[:, k]):
-                raise self._inconsistent(grid[k], settled)
-            found = [*events, (grid[k], tuple(int(mode) for mode in settled))]
-            head = window.until(k)._replace(events=found, settled=1)
-            return join([head, part(grid[k], time + length, state, settled)])
-        inner = part(grid[trouble], grid[trouble + 1], states[:, trouble], modes[:, trouble])
-        parts = [window.until(trouble)._replace(events=events), inner]
-        if trouble + 1 < INTERVALS:
-            parts.append(part(grid[trouble + 1], time + length, *inner.end))
+        counts = np.diff(np.round(count[0])).astype(int)
+        for k in np.flatnonzero(counts[: max(good, 0)]):
+            if counts[k] > LOG_SLOTS:
+                events += part(grid[k], grid[k + 1], states[:, k], modes[:, k]).events
+            else:
+                events += self._logged(time, length, times[: counts[k], k + 1], codes[:, k + 1])
+        window = Window(grid, states, modes, outputs, margins, events, 0)
+        if good == INTERVALS:
+            return window
+        if good < 0 or length / INTERVALS < FINEST_WINDOW:
+            return self._settled(window, good + 1, p, pieces, part)
+        inner = part(grid[good], grid[good + 1], states[:, good], modes[:, good])
+        parts = [window.until(good), inner]
+        if good + 1 < INTERVALS:
+            parts.append(part(grid[good + 1], time + length, *inner.end))
         return join(parts)
 
-    def _logged(self, time: float, length: float, logged: np.ndarray, count: int) -> list[tuple[float, tuple[int, ...]]]:
-        columns = logged[1:].reshape(1 + self.codes, LOG_SLOTS)[:, :count][:, ::-1]
+    def _settled(self, window: Window, k: int, p: np.ndarray, pieces: list[Piece], part: Callable) -> Window:
+        """A violation pinned down to point k: settle the modes there and go on."""
+        time, x, m = window.time[k], window.states[:, k], window.modes[:, k]
+        u = np.array([piece(time - window.time[0]) for piece in pieces])
+        state, modes = self.settle(time, x, m, u, p)
+        if np.array_equal(modes, m):
+            raise self._inconsistent(time, modes)
+        head = window.until(k)._replace(events=[*window.events, (time, tuple(int(mode) for mode in modes))], settled=1)
+        return join([head, part(time, window.time[-1], state, modes)])
+
+    def _logged(self, time: float, length: float, times: np.ndarray, codes: np.ndarray) -> list[tuple[float, tuple[int, ...]]]:
+        """Events of one output interval, oldest first."""
         found = []
-        for tau, *codes in columns.T:
-            modes = self._unpacked(np.array(codes))
+        for tau, packed in reversed(list(zip(times, codes.reshape(-1, self.code.size), strict=False))):
+            modes = self.code.words(packed)
             if tau < 0:
                 raise self._inconsistent(time, np.array(modes))
             found.append((time + length * tau, modes))

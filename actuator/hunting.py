@@ -12,9 +12,11 @@ DIVERGING, IRREGULAR = "diverging", "irregular"
 STILL = 1e-9  # rad; less motion than this is none
 SAME = 0.02  # relative difference up to which two swings or two periods are the same
 SWING = 0.1  # part of the largest late swing that counts as a turn
+FLAT = 0.01  # part of the least swing within which a plateau is level
 GROWTH = 2.0  # factor over the observed time that is growth, and its inverse decay
 STICKS = 1e-3  # part of a period at standstill from which a cycle is called hunting
-FEWEST = 4  # swings from which a trend can be seen
+SHORTEST = 20  # output points
+FEWEST = 6  # swings from which a trend can be seen
 LONGEST_PATTERN = 6  # swings after which a cycle must repeat
 
 
@@ -71,6 +73,10 @@ def classify(run: Run, *, since: float | None = None) -> Hunting:
     start = _inputs_settled(run) if since is None else since
     keep = run.t >= start
     time, load = run.t[keep], run["load_angle"][keep]
+    if len(time) < SHORTEST:
+        return Hunting(
+            verdict=IRREGULAR, reason=f"only {len(time)} output points after the last change of an input; simulate longer"
+        )
     late = load[time >= (time[0] + time[-1]) / 2]
     if np.ptp(late) <= STILL:
         drifts = _drift(run, keep)
@@ -98,10 +104,11 @@ def classify(run: Run, *, since: float | None = None) -> Hunting:
 def turning_points(signal: np.ndarray, least: float) -> list[int]:
     """Indices at which the signal turns, each swing at least `least`; a plateau counts at its first point."""
     found, low, high, rising = [], 0, 0, None
+    flat = FLAT * least
     for k in range(1, len(signal)):
-        if signal[k] > signal[high]:
+        if signal[k] > signal[high] + flat:
             high = k
-        if signal[k] < signal[low]:
+        if signal[k] < signal[low] - flat:
             low = k
         if rising is not False and signal[k] < signal[high] - least:
             found.append(high)

@@ -7,11 +7,12 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from actuator.actuator import Actuator
-from actuator.engine import INTERVALS, EngineOptions, Window, engine, join
+from actuator.engine import EngineOptions, Window, engine, join
 from actuator.hybrid import HybridSystem
 from actuator.parameters import require_known
 from actuator.run import Run, Statistics
 from actuator.signals import Constant, Signal, break_points, piece_at
+from actuator.window import INTERVALS
 
 DEFAULT_POINTS = 2000
 

@@ -10,7 +10,7 @@ import numpy as np
 from actuator.actuator import Actuator
 from actuator.hybrid import HybridSystem
 from actuator.parameters import require_known
-from actuator.run import contact_names
+from actuator.run import contact_labels, contact_names
 
 MOTIONS = {"stuck": 0, "forward": 1, "backward": -1}
 STEPS = 60  # Newton steps; the equations of a mode are nearly linear
@@ -96,8 +96,8 @@ def trim(  # noqa: PLR0913 - what may be held and where to start are all choices
 
     In a sliding mode at speed zero, friction acts with its full sliding value in that direction: the limit
     from which the contact starts, or to which it comes. In a stuck mode many points are at rest; the one
-    nearest to the guess is taken, or half way between the two sliding ones where no guess is given. Flanks
-    follow from the load.
+    nearest to the guess is taken, or where no guess is given the one that forward motion leaves behind.
+    Flanks follow from the load.
 
     Parameters
     ----------
@@ -123,8 +123,7 @@ def trim(  # noqa: PLR0913 - what may be held and where to start are all choices
     names = [quantity.name for quantity in system.states]
     require_known(drifting, names, "state")
     if guess is None and contacts == "stuck":
-        ends = [trim(system, word, inputs=inputs, parameters=parameters, drifting=drifting) for word in ("forward", "backward")]
-        guess = {name: (ends[0].states[name] + ends[1].states[name]) / 2 for name in names}
+        guess = trim(system, "forward", inputs=inputs, parameters=parameters, drifting=drifting).states
     u, p, x = system.input_vector(inputs), system.parameter_values(parameters), system.state_vector(guess)
     scale = np.array([quantity.nominal for quantity in system.states])
     free = np.array([name not in drifting for name in names])
@@ -141,13 +140,19 @@ def trim(  # noqa: PLR0913 - what may be held and where to start are all choices
             break
         flanks = found
     margins = system.margins(x, m, u, p).full().ravel()
-    if margins.size and margins.min() < HOLDS:
+    if margins.size and margins.min() < HOLDS and not _held_by_others(system, x, m, u, p):
         raise NoEquilibrium(
             f"{system.name}: {system.margin_names[int(margins.argmin())]} does not hold at this operating point (margin "
             f"{margins.min():.3g} of its usual size); choose a mode in which it slides, or another load",
             dict(zip(names, rates, strict=True)),
         )
     return OperatingPoint(system=system, x=x, m=m, u=u, p=p, rates=rates)
+
+
+def _held_by_others(system: HybridSystem, x: np.ndarray, m: np.ndarray, u: np.ndarray, p: np.ndarray) -> bool:
+    """Whether the joint decision leaves every contact stuck: where several lock one shaft, others may take over."""
+    after = system.reset(np.zeros(len(system.margin_names)), x, m, u, p)[1].full().ravel()
+    return contact_labels(system.modes, m) == contact_labels(system.modes, np.round(after))
 
 
 def _newton(system: HybridSystem, x: np.ndarray, m: np.ndarray, u: np.ndarray, p: np.ndarray, scale: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -137,11 +137,16 @@ class Backlash:
         check(self)
 
     def force(self, deflection: float, rate: float, flank: float) -> float:
-        """Normal force [N] on the given flank; zero for flank 0."""
-        penetration = ca.fmax(flank * deflection - self.gap / 2, 0)
+        """Normal force [N] on the given flank; zero for flank 0.
+
+        An engaged flank is one with penetration >= 0. The expression goes on below zero with the same slope,
+        where no run comes, so that a search for an operating point finds its way back to contact.
+        """
+        penetration = flank * deflection - self.gap / 2
         spring = self.law.spring(penetration)
+        limit = ca.fabs(spring)
         damper = self.law.damper(penetration, flank * rate)
-        return flank * (spring + ca.fmax(-spring, ca.fmin(spring, damper)))
+        return flank * (spring + ca.fmax(-limit, ca.fmin(limit, damper)))
 
     def energy(self, deflection: float, flank: float) -> float:
         """Integral of the elastic force over the deflection [J]."""

@@ -1,0 +1,31 @@
+"""One actuator: its parts, their composition, and every question that can be asked of it."""
+
+from actuator.actuator import Actuator as Actuator
+from actuator.engine import Chattering as Chattering
+from actuator.engine import InconsistentModes as InconsistentModes
+from actuator.engine import SimulationError as SimulationError
+from actuator.hunting import Hunting as Hunting
+from actuator.hunting import classify as classify
+from actuator.hybrid import HybridSystem as HybridSystem
+from actuator.inverter import Inverter as Inverter
+from actuator.linear import Margins as Margins
+from actuator.linear import linearize as linearize
+from actuator.linear import loop_transfer as loop_transfer
+from actuator.linear import margins as margins
+from actuator.load import Load as Load
+from actuator.motor import PMSM as PMSM
+from actuator.motor import DCMotor as DCMotor
+from actuator.motor import TorqueSource as TorqueSource
+from actuator.run import ModeChange as ModeChange
+from actuator.run import Run as Run
+from actuator.signals import Chirp as Chirp
+from actuator.signals import Constant as Constant
+from actuator.signals import Ramp as Ramp
+from actuator.signals import Sine as Sine
+from actuator.signals import Step as Step
+from actuator.signals import Sum as Sum
+from actuator.signals import Table as Table
+from actuator.simulate import simulate as simulate
+from actuator.trim import NoEquilibrium as NoEquilibrium
+from actuator.trim import OperatingPoint as OperatingPoint
+from actuator.trim import trim as trim

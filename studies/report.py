@@ -1,0 +1,126 @@
+"""A judgment as files: report.html with the pictures inside, the pictures, result.json."""
+
+import base64
+import json
+import math
+import os
+import platform
+import tempfile
+from dataclasses import asdict
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from matplotlib.figure import Figure
+
+from actuator.plots import plot_bode, plot_run
+from studies.judge import Judgment
+
+LIBRARIES = ("geared-actuator", "casadi", "control", "numpy", "scipy", "matplotlib")
+DPI = 130
+STEP_VIEW = 1.5  # s of the step that are shown
+CYCLES_VIEW = 3.5  # periods of a cycle that are shown
+
+
+def write_report(judgment: Judgment, folder: Path) -> list[Path]:
+    """Write report, pictures and result into `folder`; all of them or, on a failure, none.
+
+    Returns the paths that were written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder, prefix=".writing-") as hidden:
+        work = Path(hidden)
+        pictures = {}
+        for name, figure in figures(judgment).items():
+            figure.savefig(work / f"{name}.png", dpi=DPI)
+            pictures[name] = base64.b64encode((work / f"{name}.png").read_bytes()).decode()
+        result = result_of(judgment)
+        (work / "result.json").write_text(json.dumps(result, indent=2, allow_nan=False) + "\n")
+        (work / "report.html").write_text(_html(judgment, result, pictures), encoding="utf-8")
+        written = []
+        for path in sorted(work.iterdir()):
+            os.replace(path, folder / path.name)
+            written.append(folder / path.name)
+    return written
+
+
+def figures(judgment: Judgment) -> dict[str, Figure]:
+    """The pictures of a judgment by file name."""
+    run, hunting = judgment.run, judgment.hunting
+    signals = [name for name in ("motor_angle_at_load", "load_angle", "reference", "current") if name in run.signals]
+    end = float(run.t[-1])
+    found = {"step": plot_run(run, signals, span=(0.0, min(STEP_VIEW, end)))}
+    error = [name for name in ("position_error", "current", "motor_torque") if name in run.signals]
+    since = end - CYCLES_VIEW * hunting.period_s if hunting.cycles else end / 2
+    found["hunting"] = plot_run(run, error, span=(max(0.0, since), end))
+    names = next((list(model.loops) for model in judgment.models if model.loops), [])
+    for name in names:
+        loops = {model.mode: model.loops[name] for model in judgment.models if model.loops}
+        found[f"bode_{name}"] = plot_bode(loops, f"Loop transfer, opened at {name.replace('_', ' ')}")
+    return found
+
+
+def result_of(judgment: Judgment) -> dict[str, Any]:
+    """Everything that is a number, for machines; null where there is none (no cycle, no crossing)."""
+    case, run = judgment.case, judgment.run
+    return _finite(
+        {
+            "case": case.name,
+            "title": case.title,
+            "hunting": {**asdict(judgment.hunting), "amplitude_deg": math.degrees(judgment.hunting.amplitude_rad)},
+            "margins": {
+                name: {
+                    model.mode: {**asdict(found), "gain_db": found.gain_db, "phase_deg": math.degrees(found.phase_rad)}
+                    for model in judgment.models
+                    for loop, found in model.margins.items()
+                    if loop == name
+                }
+                for name in dict.fromkeys(loop for model in judgment.models for loop in model.margins)
+            },
+            "not_linearized": {model.mode: model.reason for model in judgment.models if model.reason},
+            "simulation": {
+                **run.statistics._asdict(),
+                "real_time_factor": run.statistics.simulated_s / run.statistics.wall_s,
+                "mode_changes": len(run.changes),
+            },
+            "parameters": {p.name: {"value": p.default, "unit": p.unit} for p in run.system.parameters},
+            "versions": {"python": platform.python_version()} | {name: _version(name) for name in LIBRARIES},
+        }
+    )
+
+
+def _version(library: str) -> str:
+    try:
+        return metadata.version(library)
+    except metadata.PackageNotFoundError:  # run from a checkout that is not installed
+        return "not installed"
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def _html(judgment: Judgment, result: dict[str, Any], pictures: dict[str, str]) -> str:
+    environment = Environment(loader=PackageLoader("studies"), autoescape=True, undefined=StrictUndefined)
+    environment.filters |= {"margin": _shown}
+    return environment.get_template("report.html").render(
+        case=judgment.case,
+        hunting=judgment.hunting,
+        models=judgment.models,
+        run=judgment.run,
+        result=result,
+        pictures=pictures,
+        ratio=judgment.case.actuator.gear.ratio(),
+        made=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+    )
+
+
+def _shown(value: float, digits: int = 3) -> str:
+    """A number for a table; a dash where there is no crossing."""
+    return f"{value:.{digits}g}" if math.isfinite(value) else "–"

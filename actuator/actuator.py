@@ -68,9 +68,13 @@ class Actuator:
         electric = isinstance(self.motor, DCMotor | PMSM)
         kind = type(self.motor).__name__
         if electric and not (self.inverter and isinstance(self.controller, Cascade)):
-            raise ValueError(f"Actuator: a {kind} needs an inverter and a Cascade as controller, whose current loop drives it")
+            raise ValueError(
+                f"Actuator: a {kind} needs an inverter and a Cascade as controller, whose current loop drives it"
+            )
         if not electric and (self.inverter or isinstance(self.controller, Cascade)):
-            raise ValueError(f"Actuator: a {kind} has no current: leave the inverter out and use a PID or no controller")
+            raise ValueError(
+                f"Actuator: a {kind} has no current: leave the inverter out and use a PID or no controller"
+            )
 
     def system(self) -> HybridSystem:
         """The actuator as a HybridSystem, every number a named parameter."""
@@ -139,7 +143,9 @@ class _Assembly:
             flow=ca.Function("flow", arguments, [ca.vertcat(*(rates[state.name] for state in self.states))]),
             margins=ca.Function("margins", arguments, [self.contacts.margins(angle, forces, modes)]),
             reset=self._whole_reset(settle, arguments),
-            outputs_function=ca.Function("outputs", arguments, [ca.vertcat(*(value for _, value in self.outputs.values()))]),
+            outputs_function=ca.Function(
+                "outputs", arguments, [ca.vertcat(*(value for _, value in self.outputs.values()))]
+            ),
         )
 
     # -- names ----------------------------------------------------------------------------------------

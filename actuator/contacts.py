@@ -7,7 +7,8 @@ import casadi as ca
 
 from actuator.hybrid import MARGIN_BAND
 from gear.elasticity import DEFLECTION_NOMINAL
-from gear.stiction import AT_LIMIT, RestProblem, decide, friction
+from gear.quantities import Scalar
+from gear.stiction import AT_LIMIT, Matrix, RestProblem, decide, friction
 from gear.transmission import Contact, Transmission
 
 REST_SPEED = 10 * MARGIN_BAND  # part of a contact's usual slip speed that counts as standing still
@@ -47,7 +48,7 @@ class ContactMechanics:
         Total inertia per shaft.
     """
 
-    def __init__(self, gear: Transmission, redundant: bool, inertia: Mapping[str, ca.SX]) -> None:
+    def __init__(self, gear: Transmission, redundant: bool, inertia: Mapping[str, Scalar]) -> None:
         self.gear, self.redundant, self.inertia = gear, redundant, inertia
         self.contacts: list[Contact] = gear.contacts()
         self.gaps = {name: mesh.elasticity.total_gap for name, mesh in gear.meshes.items()}
@@ -64,7 +65,7 @@ class ContactMechanics:
         count = len(self.contacts)
         return ContactModes(ca.vertcat(*whole[:count]), dict(zip(self.gear.meshes, whole[count:], strict=True)))
 
-    def slip_speeds(self, speed: Mapping[str, ca.SX]) -> ca.SX:
+    def slip_speeds(self, speed: Mapping[str, Scalar]) -> Matrix:
         """Slip speed of each contact."""
         return ca.vertcat(*(sum(c * speed[shaft] for shaft, c in contact.slip.items()) for contact in self.contacts))
 
@@ -85,16 +86,14 @@ class ContactMechanics:
         acceleration = {
             shaft: free[shaft]
             + sum(
-                contact.torque[shaft] * scalar[k]
-                for k, contact in enumerate(self.contacts)
-                if shaft in contact.torque
+                contact.torque[shaft] * scalar[k] for k, contact in enumerate(self.contacts) if shaft in contact.torque
             )
             / self.inertia[shaft]
             for shaft in self.gear.shafts
         }
         return ContactForces(normal, slip, static, sliding, compliance, demand, scalar, acceleration)
 
-    def compliance(self) -> ca.SX:
+    def compliance(self) -> Matrix:
         """G of the joint decision: slip acceleration of contact i per unit of friction against it in contact k."""
         count = len(self.contacts)
         matrix = ca.SX(count, count)
@@ -105,7 +104,7 @@ class ContactMechanics:
                     matrix[i, k] = -sum(row.slip[s] * column.torque[s] / self.inertia[s] for s in shared)
         return matrix
 
-    def limits(self, normal: Mapping, speed: ca.SX, modes: ContactModes) -> tuple[ca.SX, ca.SX]:
+    def limits(self, normal: Mapping, speed: Matrix, modes: ContactModes) -> tuple[ca.SX, ca.SX]:
         """Friction limits at rest and while sliding at `speed` >= 0; zero in a gap."""
         named = {contact.name: ca.fmax(speed[k], 0) for k, contact in enumerate(self.contacts)}
         pairs = self.gear.friction_limits(normal, named)
@@ -113,7 +112,7 @@ class ContactMechanics:
         static, sliding = (ca.vertcat(*(pairs[contact.name][j] for contact in self.contacts)) for j in (0, 1))
         return engaged * static, engaged * sliding
 
-    def _engaged(self, modes: ContactModes) -> ca.SX:
+    def _engaged(self, modes: ContactModes) -> Matrix:
         """1 per contact, 0 for a mesh in its gap."""
         return ca.vertcat(
             *(
@@ -131,12 +130,12 @@ class ContactMechanics:
             names += [f"gear.meshes.{name} {side}" for side in (("flank",) if gap is None else ("flank +", "flank -"))]
         return names
 
-    def margins(self, angle: Mapping, forces: ContactForces, modes: ContactModes) -> ca.SX:
+    def margins(self, angle: Mapping, forces: ContactForces, modes: ContactModes) -> Matrix:
         """Margins in the order of `margin_names`.
 
-            stuck:    (static - s) and (static + s), over a usual friction force
-            sliding:  direction * slip speed, over a usual speed
-            flank:    flank * F_n without a gap, else the penetration or the distance to the flank
+        stuck:    (static - s) and (static + s), over a usual friction force
+        sliding:  direction * slip speed, over a usual speed
+        flank:    flank * F_n without a gap, else the penetration or the distance to the flank
         """
         deflection = self.gear.deflections(angle)
         rows = []
@@ -162,7 +161,7 @@ class ContactMechanics:
 
     # -- reset ----------------------------------------------------------------------------------------
 
-    def flanks_after(self, fired: ca.SX, angle: Mapping, speed: Mapping, before: Mapping[str, ca.SX]) -> list[ca.SX]:
+    def flanks_after(self, fired: Matrix, angle: Mapping, speed: Mapping, before: Mapping[str, Scalar]) -> list[ca.SX]:
         """Flank of each mesh after an event; from the deflection where the event was elsewhere."""
         deflection = self.gear.deflections(angle)
         row, found = 2 * len(self.contacts), []
@@ -182,7 +181,9 @@ class ContactMechanics:
             row += 2
         return found
 
-    def problem(self, fired: ca.SX, angle: Mapping, speed: Mapping, torque: Mapping, before: ca.SX, flank: Mapping) -> RestProblem:
+    def problem(
+        self, fired: Matrix, angle: Mapping, speed: Mapping, torque: Mapping, before: Matrix, flank: Mapping
+    ) -> RestProblem:
         """What is to be decided jointly after an event: which contacts are at rest, and what they must bear."""
         slip = self.slip_speeds(speed)
         direction = ca.sign(slip)
@@ -207,7 +208,16 @@ class ContactMechanics:
             released=ca.vertcat(*released),
         )
 
-    def reset_function(self, name: str, arguments: list[ca.SX], fired: ca.SX, angle: Mapping, speed: Mapping, torque: Mapping, m: ca.SX) -> ca.Function:
+    def reset_function(
+        self,
+        name: str,
+        arguments: list[ca.SX],
+        fired: Matrix,
+        angle: Mapping,
+        speed: Mapping,
+        torque: Mapping,
+        m: ca.SX,
+    ) -> ca.Function:
         """(fired, *arguments) -> speeds after, modes after, fault; all modes decided together.
 
         Contacts at rest get their slip speed set to exactly zero by an impulse along their own friction.
@@ -216,14 +226,20 @@ class ContactMechanics:
         flank = self.flanks_after(fired, angle, speed, before.flank)
         named = dict(zip(self.gear.meshes, flank, strict=True))
         problem = self.problem(fired, angle, speed, torque, before.motion, named)
-        impulse = friction(problem.compliance, self.slip_speeds(speed), problem.rest, ca.SX.zeros(len(self.contacts)), self.redundant)
+        impulse = friction(
+            problem.compliance, self.slip_speeds(speed), problem.rest, ca.SX.zeros(len(self.contacts)), self.redundant
+        )
         speeds = [
             speed[shaft]
             + sum(c.torque[shaft] * impulse[k] for k, c in enumerate(self.contacts) if shaft in c.torque)
             / self.inertia[shaft]
             for shaft in self.gear.shafts
         ]
-        pose = ca.Function(f"{name}_pose", [fired, *arguments], [*problem, ca.sign(self.slip_speeds(speed)), ca.vertcat(*flank), ca.vertcat(*speeds)])
+        pose = ca.Function(
+            f"{name}_pose",
+            [fired, *arguments],
+            [*problem, ca.sign(self.slip_speeds(speed)), ca.vertcat(*flank), ca.vertcat(*speeds)],
+        )
         inputs = [ca.MX.sym(f"input{i}", symbol.shape[0]) for i, symbol in enumerate((fired, *arguments))]
         *posed, direction, flanks, after = pose(*inputs)
         posed = RestProblem(*posed)

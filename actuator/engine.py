@@ -57,17 +57,24 @@ class Window(NamedTuple):
 
     def until(self, k: int) -> "Window":
         """The points up to and including k."""
-        return Window(*(array[..., : k + 1] for array in self[:5]), self.events, self.settled)
+        return self._replace(**{name: getattr(self, name)[..., : k + 1] for name in ARRAYS})
+
+
+ARRAYS = ("time", "states", "modes", "outputs", "margins")  # fields of a window with a column per point
 
 
 def join(windows: list[Window]) -> Window:
     """Windows in a row; of a point that two share the later value counts."""
-    *heads, last = windows
-    arrays = [[array[..., :-1] for array in window[:5]] for window in heads] + [list(last[:5])]
-    return Window(
-        *(np.concatenate(parts, axis=-1) for parts in zip(*arrays, strict=True)),
-        [event for window in windows for event in window.events],
-        sum(window.settled for window in windows),
+    last = len(windows) - 1
+
+    def joined(name: str) -> np.ndarray:
+        parts = [getattr(window, name) for window in windows]
+        return np.concatenate([part if k == last else part[..., :-1] for k, part in enumerate(parts)], axis=-1)
+
+    return windows[last]._replace(
+        **{name: joined(name) for name in ARRAYS},
+        events=[event for window in windows for event in window.events],
+        settled=sum(window.settled for window in windows),
     )
 
 
@@ -109,7 +116,9 @@ class Engine:
         self.compiled = loaded is not None
         self.window = loaded or function
 
-    def settle(self, time: float, x: np.ndarray, m: np.ndarray, u: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def settle(
+        self, time: float, x: np.ndarray, m: np.ndarray, u: np.ndarray, p: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """State and modes after a consistent decision of all modes from the continuous state.
 
         Raises
@@ -123,7 +132,9 @@ class Engine:
             raise self._inconsistent(time, modes)
         return state.full().ravel(), modes
 
-    def run(self, time: float, length: float, x: np.ndarray, m: np.ndarray, p: np.ndarray, pieces: list[Piece]) -> Window:
+    def run(
+        self, time: float, length: float, x: np.ndarray, m: np.ndarray, p: np.ndarray, pieces: list[Piece]
+    ) -> Window:
         """From `time` over `length` in at least INTERVALS output intervals, modes checked on every point."""
 
         def part(start: float, end: float, x: np.ndarray, m: np.ndarray) -> Window:
@@ -173,7 +184,9 @@ class Engine:
         head = window.until(k)._replace(events=[*window.events, (time, tuple(int(mode) for mode in modes))], settled=1)
         return join([head, part(time, window.time[-1], state, modes)])
 
-    def _logged(self, time: float, length: float, times: np.ndarray, codes: np.ndarray) -> list[tuple[float, tuple[int, ...]]]:
+    def _logged(
+        self, time: float, length: float, times: np.ndarray, codes: np.ndarray
+    ) -> list[tuple[float, tuple[int, ...]]]:
         """Events of one output interval, oldest first."""
         found = []
         for tau, packed in reversed(list(zip(times, codes.reshape(-1, self.code.size), strict=False))):
@@ -197,7 +210,7 @@ class Engine:
         named = {name: int(mode) for name, mode in zip(self.system.modes, modes, strict=True)}
         return InconsistentModes(
             f"{self.system.name}: no combination of contact modes is consistent at t = {time:.9g} s; the last tried is "
-            f"{', '.join(f'{name} = {mode}' for name, mode in named.items())}. Is friction so strong that the train jams?",
+            f"{', '.join(f'{name} = {mode}' for name, mode in named.items())}. Does friction jam the train?",
             time,
             named,
         )

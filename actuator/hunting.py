@@ -75,7 +75,8 @@ def classify(run: Run, *, since: float | None = None) -> Hunting:
     time, load = run.t[keep], run["load_angle"][keep]
     if len(time) < SHORTEST:
         return Hunting(
-            verdict=IRREGULAR, reason=f"only {len(time)} output points after the last change of an input; simulate longer"
+            verdict=IRREGULAR,
+            reason=f"only {len(time)} output points after the last change of an input; simulate longer",
         )
     late = load[time >= (time[0] + time[-1]) / 2]
     if np.ptp(late) <= STILL:
@@ -163,7 +164,9 @@ def _pattern(swings: np.ndarray, times: np.ndarray) -> int | None:
     return None
 
 
-def _period(run: Run, time: np.ndarray, load: np.ndarray, start: float, end: float) -> tuple[float, tuple[float, float]]:
+def _period(
+    run: Run, time: np.ndarray, load: np.ndarray, start: float, end: float
+) -> tuple[float, tuple[float, float]]:
     """Period and the window it was measured in, from upward passages of mid-swing before `end`."""
     rough = end - start
     window = (time >= end - 1.05 * rough) & (time <= end)
@@ -204,13 +207,15 @@ def _without_cycle(swings: np.ndarray, load: np.ndarray, observed: float) -> Hun
     total = swings[-1] / swings[-FEWEST]
     if (ratios[-FEWEST:] > 1 + SAME).all() and swings[-1] / swings[0] > GROWTH:
         return Hunting(
-            verdict=DIVERGING, reason=f"the swings of the load grow, by a factor {swings[-1] / swings[0]:.3g} in {observed:g} s"
+            verdict=DIVERGING,
+            reason=f"the swings of the load grow, by a factor {swings[-1] / swings[0]:.3g} in {observed:g} s",
         )
     # a transient into a cycle shrinks too, but by less and less: look one swing ahead
     ahead = max(ratios[-1], 2 * ratios[-1] - ratios[-2])
     if (ratios[1 - FEWEST :] < 1 - 2 * SAME).all() and ahead < 1 - 2 * SAME:
         return Hunting(
-            verdict=REST, reason=f"each swing of the load is smaller than the one before, the last {FEWEST} by {total:.3g}"
+            verdict=REST,
+            reason=f"each swing of the load is smaller than the one before, the last {FEWEST} by {total:.3g}",
         )
     return Hunting(
         verdict=IRREGULAR,

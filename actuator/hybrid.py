@@ -73,7 +73,9 @@ class HybridSystem:
         names = [quantity.name for quantity in (*self.states, *self.inputs, *self.outputs)]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
-            raise ValueError(f"HybridSystem {self.name}: signals share a name: {', '.join(twice)}; rename a shaft or an output")
+            raise ValueError(
+                f"HybridSystem {self.name}: signals share a name: {', '.join(twice)}; rename a shaft or an output"
+            )
 
     def parameter_values(self, changes: Mapping[str, float] | None = None) -> np.ndarray:
         """Values of p: the defaults, with `changes` by name."""

@@ -7,7 +7,7 @@ from typing import Annotated
 import casadi as ca
 from annotated_types import Gt, Unit
 
-from gear.quantities import check
+from gear.quantities import Scalar, check
 
 Voltage = Annotated[float, Unit("V"), Gt(0)]
 Current = Annotated[float, Unit("A"), Gt(0)]
@@ -34,7 +34,7 @@ class Inverter:
     def __post_init__(self) -> None:
         check(self)
 
-    def realize(self, voltages: list[float]) -> list[float]:
+    def realize(self, voltages: list[Scalar]) -> list[Scalar]:
         """The voltages the motor gets [V] from those demanded; the direction of the vector is kept."""
         if len(voltages) == 1:
             return [ca.fmax(-self.dc_voltage, ca.fmin(self.dc_voltage, voltages[0]))]
@@ -44,6 +44,6 @@ class Inverter:
         scale = limit / ca.sqrt(ca.fmax(square, limit**2))
         return [scale * voltage for voltage in voltages]
 
-    def allow(self, current: float) -> float:
+    def allow(self, current: Scalar) -> Scalar:
         """The torque-producing current [A] that may be asked for."""
         return ca.fmax(-self.current_limit, ca.fmin(self.current_limit, current))

@@ -64,7 +64,7 @@ def linearize(
     columns = [[quantity.name for quantity in system.inputs].index(name) for name in inputs]
     c, d = np.vstack([c, np.eye(len(state_names))]), np.vstack([d, np.zeros((len(state_names), d.shape[1]))])
     rows = [[*output_names, *state_names].index(name) for name in outputs]
-    return control.ss(
+    return control.StateSpace(
         a,
         b[:, columns],
         c[rows],
@@ -113,8 +113,8 @@ def loop_transfer(point: OperatingPoint, at: str, *, drifting: Sequence[str] = (
     require_known([at], points, "loop signal")
     closed = linearize(point, [PREFIX + at], [at], drifting=drifting)
     # closed:  used = computed + d.  Cut:  d = used - computed, so d = (used - C x)/(1 + D)
-    through = 1 / (1 + closed.D[0, 0])
-    return control.ss(
+    through = 1 / (1 + np.asarray(closed.D).item())
+    return control.StateSpace(
         closed.A - through * closed.B @ closed.C,
         through * closed.B,
         -through * closed.C,
@@ -172,7 +172,7 @@ def margins(loop: control.StateSpace, frequencies: np.ndarray = GRID) -> Margins
     def response(frequency: float) -> complex:
         return complex(loop(1j * frequency))
 
-    values = loop(1j * frequencies)
+    values = np.asarray(loop(1j * frequencies))
     gain_crossings = _roots(lambda w: abs(response(w)) - 1, frequencies, abs(values) - 1)
     # on the negative real axis the imaginary part changes sign, away from it the branch at 0 deg does too
     phase_crossings = [
@@ -203,4 +203,5 @@ def margins(loop: control.StateSpace, frequencies: np.ndarray = GRID) -> Margins
 
 def _roots(function: Callable[[float], float], grid: np.ndarray, values: np.ndarray) -> list[float]:
     brackets = np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0)
-    return [float(brentq(function, grid[k], grid[k + 1], xtol=1e-12 * grid[k])) for k in brackets]
+    found = (brentq(function, grid[k], grid[k + 1], xtol=1e-12 * grid[k], full_output=True)[1] for k in brackets)
+    return [float(result.root) for result in found]

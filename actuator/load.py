@@ -5,7 +5,7 @@ from typing import Annotated
 
 from annotated_types import Ge, Unit
 
-from gear.quantities import TorsionalDamping, check
+from gear.quantities import Scalar, TorsionalDamping, check
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +37,6 @@ class Load:
     def __post_init__(self) -> None:
         check(self)
 
-    def torque(self, angle: float, speed: float) -> float:
+    def torque(self, angle: Scalar, speed: Scalar) -> Scalar:
         """Torque on the output shaft [N m]."""
         return self.bias - self.stiffness * angle - self.damping * speed

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from annotated_types import Gt, Unit
 
-from gear.quantities import check
+from gear.quantities import Scalar, check
 
 Resistance = Annotated[float, Unit("ohm"), Gt(0)]
 Inductance = Annotated[float, Unit("H"), Gt(0)]
@@ -57,23 +57,23 @@ class DCMotor:
     def __post_init__(self) -> None:
         check(self)
 
-    def torque(self, currents: list[float]) -> float:
+    def torque(self, currents: list[Scalar]) -> Scalar:
         """Electromagnetic torque [N m]."""
         return self.torque_constant * currents[0]
 
-    def current_for(self, torque: float) -> float:
+    def current_for(self, torque: Scalar) -> Scalar:
         """Current [A] for a torque [N m]."""
         return torque / self.torque_constant
 
-    def references(self, current: float) -> list[float]:
+    def references(self, current: Scalar) -> list[Scalar]:
         """Current reference of each axis [A] from the torque-producing one."""
         return [current]
 
-    def coupling_voltages(self, currents: list[float], speed: float) -> list[float]:
+    def coupling_voltages(self, currents: list[Scalar], speed: Scalar) -> list[Scalar]:
         """Voltages [V] from motion."""
         return [self.torque_constant * speed]
 
-    def derivatives(self, currents: list[float], voltages: list[float], speed: float) -> list[float]:
+    def derivatives(self, currents: list[Scalar], voltages: list[Scalar], speed: Scalar) -> list[Scalar]:
         """Time derivatives of the currents [A/s]."""
         motion = self.coupling_voltages(currents, speed)[0]
         return [(voltages[0] - self.resistance * currents[0] - motion) / self.inductance]
@@ -119,20 +119,20 @@ class PMSM:
         if isinstance(self.pole_pairs, bool) or not isinstance(self.pole_pairs, int) or self.pole_pairs < 1:
             raise ValueError(f"PMSM.pole_pairs must be a whole number >= 1, got {self.pole_pairs!r}")
 
-    def torque(self, currents: list[float]) -> float:
+    def torque(self, currents: list[Scalar]) -> Scalar:
         """Electromagnetic torque [N m]."""
         direct, quadrature = currents
         return 1.5 * self.pole_pairs * (self.flux + (self.inductance_d - self.inductance_q) * direct) * quadrature
 
-    def current_for(self, torque: float) -> float:
+    def current_for(self, torque: Scalar) -> Scalar:
         """Quadrature current [A peak] for a torque [N m] at zero direct current."""
         return torque / (1.5 * self.pole_pairs * self.flux)
 
-    def references(self, current: float) -> list[float]:
+    def references(self, current: Scalar) -> list[Scalar]:
         """Current reference of each axis [A] from the torque-producing one."""
         return [0.0, current]
 
-    def coupling_voltages(self, currents: list[float], speed: float) -> list[float]:
+    def coupling_voltages(self, currents: list[Scalar], speed: Scalar) -> list[Scalar]:
         """Voltages [V] from motion: back-emf and the coupling of the axes."""
         electrical = self.pole_pairs * speed
         direct, quadrature = currents
@@ -141,7 +141,7 @@ class PMSM:
             electrical * (self.inductance_d * direct + self.flux),
         ]
 
-    def derivatives(self, currents: list[float], voltages: list[float], speed: float) -> list[float]:
+    def derivatives(self, currents: list[Scalar], voltages: list[Scalar], speed: Scalar) -> list[Scalar]:
         """Time derivatives of the currents [A/s]."""
         motion = self.coupling_voltages(currents, speed)
         inductances = (self.inductance_d, self.inductance_q)

@@ -16,7 +16,12 @@ from actuator.run import BACKWARD, FORWARD, FREE, STUCK, Run
 MODE_COLORS = {STUCK: "#4d4d4d", FORWARD: "#3b75af", BACKWARD: "#e1812c", FREE: "#d9d9d9"}
 LINE_COLORS = {"stuck": "#4d4d4d", "forward": "#3b75af", "backward": "#e1812c"}
 LINE_STYLES = {"backward": (0, (4, 3))}  # both directions often lie on each other
-LEGEND_ABOVE: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1, 0.97), "fontsize": "small", "frameon": False}
+LEGEND_ABOVE: dict[str, Any] = {
+    "loc": "lower right",
+    "bbox_to_anchor": (1, 0.97),
+    "fontsize": "small",
+    "frameon": False,
+}
 RIBBON_HEIGHT = 0.28  # inch per contact
 DEGREES = 180 / np.pi
 

@@ -44,7 +44,7 @@ def contact_names(modes: Sequence[str]) -> list[str]:
     return [name.removesuffix(".motion") for name in modes if name.endswith(".motion")]
 
 
-def contact_labels(modes: Sequence[str], values: Sequence[float]) -> dict[str, str]:
+def contact_labels(modes: Sequence[str], values: Sequence[float] | np.ndarray) -> dict[str, str]:
     """Mode of each contact in words, from the mode variables."""
     named = dict(zip(modes, values, strict=True))
     return {
@@ -114,7 +114,9 @@ class Run:
         changes = []
         for time, values in window.events:
             after = contact_labels(system.modes, values)
-            changes += [ModeChange(time, name, before[name], mode) for name, mode in after.items() if mode != before[name]]
+            changes += [
+                ModeChange(time, name, before[name], mode) for name, mode in after.items() if mode != before[name]
+            ]
             before = after
         return cls(
             system=system,

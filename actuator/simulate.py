@@ -72,14 +72,14 @@ def simulate(  # noqa: PLR0913 - a simulation has this many choices, all but two
         if not (value > 0 and math.isfinite(value)):
             raise ValueError(f"simulate: {name} must be > 0 s, got {value!r}")
     signals = _signals(system, inputs or {})
-    waves = {
-        (wave.frequency, wave.rate) for signal in signals for _, piece in signal.pieces() for wave in piece.waves
-    }
+    waves = {(wave.frequency, wave.rate) for signal in signals for _, piece in signal.pieces() for wave in piece.waves}
     x, p = system.state_vector(start), system.parameter_values(parameters)
     machine = engine(system, EngineOptions(tolerance=tolerance, compiled=compiled, waves=len(waves)))
 
     began = clock.perf_counter()
-    stops = sorted({time for signal in signals for time in break_points(signal) if 0 < time < duration} | {0.0, duration})
+    stops = sorted(
+        {time for signal in signals for time in break_points(signal) if 0 < time < duration} | {0.0, duration}
+    )
     m = np.zeros(len(system.modes))
     windows: list[Window] = []
     for first, last in zip(stops, stops[1:], strict=False):

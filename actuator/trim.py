@@ -59,7 +59,9 @@ class OperatingPoint:
         return {quantity.name: float(value) for quantity, value in zip(self.system.outputs, values, strict=True)}
 
 
-def modes_of(system: HybridSystem, contacts: str | Mapping[str, str], flanks: Mapping[str, int] | None = None) -> np.ndarray:
+def modes_of(
+    system: HybridSystem, contacts: str | Mapping[str, str], flanks: Mapping[str, int] | None = None
+) -> np.ndarray:
     """Mode vector from words.
 
     One word for all contacts is about the output: "stuck", or all contacts sliding as they do when the output
@@ -142,8 +144,8 @@ def trim(  # noqa: PLR0913 - what may be held and where to start are all choices
     margins = system.margins(x, m, u, p).full().ravel()
     if margins.size and margins.min() < HOLDS and not _held_by_others(system, x, m, u, p):
         raise NoEquilibrium(
-            f"{system.name}: {system.margin_names[int(margins.argmin())]} does not hold at this operating point (margin "
-            f"{margins.min():.3g} of its usual size); choose a mode in which it slides, or another load",
+            f"{system.name}: {system.margin_names[int(margins.argmin())]} does not hold at this operating point "
+            f"(margin {margins.min():.3g} of its usual size); choose a mode in which it slides, or another load",
             dict(zip(names, rates, strict=True)),
         )
     return OperatingPoint(system=system, x=x, m=m, u=u, p=p, rates=rates)
@@ -155,7 +157,15 @@ def _held_by_others(system: HybridSystem, x: np.ndarray, m: np.ndarray, u: np.nd
     return contact_labels(system.modes, m) == contact_labels(system.modes, np.round(after))
 
 
-def _newton(system: HybridSystem, x: np.ndarray, m: np.ndarray, u: np.ndarray, p: np.ndarray, scale: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _newton(
+    system: HybridSystem,
+    x: np.ndarray,
+    m: np.ndarray,
+    u: np.ndarray,
+    p: np.ndarray,
+    scale: np.ndarray,
+    free: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
     """Least-norm Newton steps, in states over their nominal sizes, damped until the residual falls."""
     jacobian = _jacobian(system)
     drifts = ~free  # a drifting state may have any constant rate
@@ -170,7 +180,7 @@ def _newton(system: HybridSystem, x: np.ndarray, m: np.ndarray, u: np.ndarray, p
         matrix = jacobian(x, m, u, p).full() / scale[:, None] * scale[None, :]
         rows = 1 / np.maximum(np.linalg.norm(matrix, axis=1), 1e-12)  # stiff rows would drown the others
         step = np.zeros_like(x)
-        step[free] = np.linalg.lstsq((rows[:, None] * matrix)[np.ix_(free, free)], -(rows * rate)[free], rcond=1e-13)[0]
+        step[free] = np.linalg.lstsq((rows[:, None] * matrix)[free][:, free], -(rows * rate)[free], rcond=1e-13)[0]
         for damping in (1.0, 0.5, 0.1, 0.01):
             trial = residual(x + damping * scale * step)
             if np.linalg.norm(rows * trial) < np.linalg.norm(rows * rate):

@@ -80,20 +80,24 @@ class InputForm(NamedTuple):
         return self.inputs * (2 + 2 * self.waves) + 2 * self.waves
 
     def values(self, time: ca.SX, coefficients: ca.SX) -> ca.SX:
-        """u at `time` after the start of the window."""
+        """Value of u at `time` after the start of the window."""
         n = self.inputs
         u = coefficients[:n] + coefficients[n : 2 * n] * time
         for k in range(self.waves):
             first, pair = (2 + 2 * k) * n, (2 + 2 * self.waves) * n + 2 * k
             angle = coefficients[pair] * time + coefficients[pair + 1] * time**2 / 2
-            u += coefficients[first : first + n] * ca.sin(angle) + coefficients[first + n : first + 2 * n] * ca.cos(angle)
+            u += coefficients[first : first + n] * ca.sin(angle) + coefficients[first + n : first + 2 * n] * ca.cos(
+                angle
+            )
         return u
 
     def coefficients(self, pieces: list[Piece]) -> np.ndarray:
         """Coefficient vector from one piece per input."""
         n, shapes = self.inputs, sorted({(wave.frequency, wave.rate) for piece in pieces for wave in piece.waves})
         if len(shapes) > self.waves:
-            raise ValueError(f"the inputs have {len(shapes)} different waves at once, the engine was built for {self.waves}")
+            raise ValueError(
+                f"the inputs have {len(shapes)} different waves at once, the engine was built for {self.waves}"
+            )
         vector = np.zeros(self.size)
         for i, piece in enumerate(pieces):
             vector[i], vector[n + i] = piece.offset, piece.slope
@@ -142,13 +146,19 @@ def window_function(system: HybridSystem, form: InputForm, code: ModeCode, toler
     with contextlib.redirect_stderr(io.StringIO()):  # "Event support is experimental", once per integrator
         integrator = ca.integrator("integrator", "rosenbrock", dae, 0, list(grid[1:]), settings)
 
-    observe = ca.Function("observe", [tau, y, p, length, wave], [arguments[1], system.outputs_function(*arguments), system.margins(*arguments)])
+    observe = ca.Function(
+        "observe",
+        [tau, y, p, length, wave],
+        [arguments[1], system.outputs_function(*arguments), system.margins(*arguments)],
+    )
     x0, m0 = ca.MX.sym("x0", nx), ca.MX.sym("m0", len(system.modes))
     given = ca.MX.sym("p", len(system.parameters)), ca.MX.sym("length"), ca.MX.sym("wave", form.size)
     start = ca.vertcat(x0 / nominal, code.pack(m0), ca.DM.zeros(log_size))
     path = ca.horzcat(start, integrator(x0=start, p=ca.vertcat(*given, once(given[0])))["xf"])
     modes, outputs, margin = observe.map(points)(ca.DM(grid).T, path, *(ca.repmat(g, 1, points) for g in given))
-    states, codes, count, times, older = ca.vertsplit(path, list(np.cumsum([0, nx, nc, 1, LOG_SLOTS, (LOG_SLOTS - 1) * nc])))
+    states, codes, count, times, older = ca.vertsplit(
+        path, list(np.cumsum([0, nx, nc, 1, LOG_SLOTS, (LOG_SLOTS - 1) * nc]))
+    )
     return ca.Function(
         "window",
         [x0, m0, *given],
@@ -160,9 +170,12 @@ def _transition(system: HybridSystem, form: InputForm, code: ModeCode, size: int
     """The reset of the system as the integrator calls it, with the event put into the log."""
     nominal = ca.DM([state.nominal for state in system.states])
     nx, nc, n_p = len(system.states), code.size, len(system.parameters)
-    index, tau, y, everything = (ca.MX.sym(*s) for s in (("index",), ("tau",), ("y", size), ("everything", size_p)))
+    index, tau = ca.MX.sym("index"), ca.MX.sym("tau")
+    y, everything = ca.MX.sym("y", size), ca.MX.sym("everything", size_p)
     p, length, wave = everything[:n_p], everything[n_p], everything[n_p + 1 : n_p + 1 + form.size]
-    states, codes, count, times, older = ca.vertsplit(y, list(np.cumsum([0, nx, nc, 1, LOG_SLOTS, (LOG_SLOTS - 1) * nc])))
+    states, codes, count, times, older = ca.vertsplit(
+        y, list(np.cumsum([0, nx, nc, 1, LOG_SLOTS, (LOG_SLOTS - 1) * nc]))
+    )
     t, w, c = ca.SX.sym("t"), ca.SX.sym("w", form.size), ca.SX.sym("c", nc)
     u = ca.Function("input", [t, w], [form.values(t, w)])(tau * length, wave)
     m = ca.Function("unpack", [c], [code.unpack(c)])(codes)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from controllers.pid import PI, P, limited
-from controllers.rules import Speed, check
+from controllers.rules import Scalar, Speed, check
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,6 +71,6 @@ class Cascade:
             feedback=feedback,
         )
 
-    def speed_reference(self, error: float, ratio: float) -> float:
+    def speed_reference(self, error: Scalar, ratio: Scalar) -> Scalar:
         """Motor speed reference [rad/s] from the position error at the load [rad]."""
         return limited(ratio * self.position.output(error), self.speed_limit)

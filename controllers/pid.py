@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from controllers.rules import DerivativeGain, IntegralGain, Limit, PositiveGain, Rate, Time, check
+from controllers.rules import DerivativeGain, IntegralGain, Limit, PositiveGain, Rate, Scalar, Time, check
 
 
-def limited(value: float, limit: float | None) -> float:
+def limited(value: Scalar, limit: Scalar | None) -> Scalar:
     """`value` held within +-limit; unchanged for limit None."""
     return value if limit is None else ca.fmax(-limit, ca.fmin(limit, value))
 
@@ -37,7 +37,7 @@ class P:
         """For a plant that integrates (speed to position) and a closed-loop bandwidth [rad/s]."""
         return cls(gain=bandwidth)
 
-    def output(self, error: float) -> float:
+    def output(self, error: Scalar) -> Scalar:
         """Proposed output."""
         return self.gain * error
 
@@ -85,11 +85,11 @@ class PI:
         """Current control of a winding: its zero cancels R/L, leaving one pole at `bandwidth` [rad/s]."""
         return cls(proportional=bandwidth * inductance, integral=bandwidth * resistance)
 
-    def proposed(self, state: float, error: float) -> float:
+    def proposed(self, state: Scalar, error: Scalar) -> Scalar:
         """Output before any limit."""
         return self.proportional * error + state
 
-    def derivative(self, error: float, proposed: float, realized: float) -> float:
+    def derivative(self, error: Scalar, proposed: Scalar, realized: Scalar) -> Scalar:
         """Time derivative of the integral state."""
         rate = self.integral / self.proportional if self.back_calculation is None else self.back_calculation
         return self.integral * error + rate * (realized - proposed)
@@ -141,15 +141,15 @@ class PID:
             filter_time=filter_time,
         )
 
-    def rate(self, measured: float, filtered: float) -> float:
+    def rate(self, measured: Scalar, filtered: Scalar) -> Scalar:
         """Filtered derivative of the measurement; only with `filter_time`."""
         return (measured - filtered) / self.filter_time
 
-    def proposed(self, state: float, error: float, rate: float) -> float:
+    def proposed(self, state: Scalar, error: Scalar, rate: Scalar) -> Scalar:
         """Output before any limit."""
         return self.proportional * error + state - self.derivative * rate
 
-    def integral_derivative(self, error: float, proposed: float, realized: float) -> float:
+    def integral_derivative(self, error: Scalar, proposed: Scalar, realized: Scalar) -> Scalar:
         """Time derivative of the integral state."""
         rate = self.integral / self.proportional if self.back_calculation is None else self.back_calculation
         return self.integral * error + rate * (realized - proposed)

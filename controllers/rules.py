@@ -6,6 +6,8 @@ from typing import Annotated, Any, get_args, get_type_hints
 
 from annotated_types import Ge, Gt, Unit
 
+Scalar = Any  # a float, or a CasADi expression of one: laws are written once for both
+
 Rate = Annotated[float, Unit("1/s"), Ge(0)]
 Time = Annotated[float, Unit("s"), Gt(0)]
 Speed = Annotated[float, Unit("rad/s"), Gt(0)]
@@ -25,7 +27,8 @@ def check(owner: Any) -> None:
         if value is None or not notes:
             continue
         unit, rule = notes
-        holds = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-        if not holds or not (value > rule.gt if isinstance(rule, Gt) else value >= rule.ge):
-            bound = "> 0" if isinstance(rule, Gt) else ">= 0"
-            raise ValueError(f"{type(owner).__name__}.{field.name} must be {bound} {unit.unit}, got {value!r}")
+        number = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+        if not number or not (value > 0 if isinstance(rule, Gt) else value >= 0):
+            bound, where = "> 0" if isinstance(rule, Gt) else ">= 0", f"{type(owner).__name__}.{field.name}"
+            shown = f"{value:.6g} {unit.unit}" if number else repr(value)
+            raise ValueError(f"{where} must be {bound} {unit.unit}, got {shown}")

@@ -5,7 +5,7 @@ from typing import Protocol
 
 import casadi as ca
 
-from gear.quantities import Damping, Distance, Stiffness, check
+from gear.quantities import Damping, Distance, Scalar, Stiffness, check
 
 DEFLECTION_NOMINAL = 1e-6  # m; teeth under load bend by about a micrometer
 
@@ -13,15 +13,15 @@ DEFLECTION_NOMINAL = 1e-6  # m; teeth under load bend by about a micrometer
 class ToothSpring(Protocol):
     """An elastic tooth contact without gap; `Backlash` wraps one."""
 
-    def spring(self, deflection: float) -> float:
+    def spring(self, deflection: Scalar) -> Scalar:
         """Elastic force [N]."""
         ...
 
-    def damper(self, deflection: float, rate: float) -> float:
+    def damper(self, deflection: Scalar, rate: Scalar) -> Scalar:
         """Damping force [N]."""
         ...
 
-    def energy(self, deflection: float) -> float:
+    def energy(self, deflection: Scalar) -> Scalar:
         """Work [J/m per m of travel] stored by `spring`, its integral from zero."""
         ...
 
@@ -33,21 +33,21 @@ class ElasticityLaw(Protocol):
     the mesh; a law says the force on a given flank and, by its gap, where flanks engage.
     """
 
-    def force(self, deflection: float, rate: float, flank: float) -> float:
+    def force(self, deflection: Scalar, rate: Scalar, flank: Scalar) -> Scalar:
         """Normal force [N], positive when A pushes B towards positive travel."""
         ...
 
-    def energy(self, deflection: float, flank: float) -> float:
+    def energy(self, deflection: Scalar, flank: Scalar) -> Scalar:
         """Integral of the elastic force over the deflection [J]."""
         ...
 
     @property
-    def total_gap(self) -> float | None:
+    def total_gap(self) -> Scalar | None:
         """Total gap between the flanks [m], or None for a law without one."""
         ...
 
     @property
-    def nominal_force(self) -> float:
+    def nominal_force(self) -> Scalar:
         """Size of a usual normal force [N], for scaling."""
         ...
 
@@ -76,19 +76,19 @@ class Linear:
     def __post_init__(self) -> None:
         check(self)
 
-    def spring(self, deflection: float) -> float:
+    def spring(self, deflection: Scalar) -> Scalar:
         """Elastic force [N]."""
         return self.stiffness * deflection
 
-    def damper(self, deflection: float, rate: float) -> float:
+    def damper(self, deflection: Scalar, rate: Scalar) -> Scalar:
         """Damping force [N]."""
         return self.damping * rate
 
-    def force(self, deflection: float, rate: float, flank: float) -> float:
+    def force(self, deflection: Scalar, rate: Scalar, flank: Scalar) -> Scalar:
         """Normal force [N]; the same expression on both flanks."""
         return self.spring(deflection) + self.damper(deflection, rate)
 
-    def energy(self, deflection: float, flank: float = 1.0) -> float:
+    def energy(self, deflection: Scalar, flank: Scalar = 1.0) -> Scalar:
         """Integral of the elastic force over the deflection [J]."""
         return self.stiffness * deflection**2 / 2
 
@@ -98,7 +98,7 @@ class Linear:
         return None
 
     @property
-    def nominal_force(self) -> float:
+    def nominal_force(self) -> Scalar:
         """Force [N] at a deflection of one micrometer."""
         return self.stiffness * DEFLECTION_NOMINAL
 
@@ -136,7 +136,7 @@ class Backlash:
     def __post_init__(self) -> None:
         check(self)
 
-    def force(self, deflection: float, rate: float, flank: float) -> float:
+    def force(self, deflection: Scalar, rate: Scalar, flank: Scalar) -> Scalar:
         """Normal force [N] on the given flank; zero for flank 0.
 
         An engaged flank is one with penetration >= 0. The expression goes on below zero with the same slope,
@@ -148,16 +148,16 @@ class Backlash:
         damper = self.law.damper(penetration, flank * rate)
         return flank * (spring + ca.fmax(-limit, ca.fmin(limit, damper)))
 
-    def energy(self, deflection: float, flank: float) -> float:
+    def energy(self, deflection: Scalar, flank: Scalar) -> Scalar:
         """Integral of the elastic force over the deflection [J]."""
         return self.law.energy(ca.fmax(flank * deflection - self.gap / 2, 0))
 
     @property
-    def total_gap(self) -> float:
+    def total_gap(self) -> Scalar:
         """Total gap [m]."""
         return self.gap
 
     @property
-    def nominal_force(self) -> float:
+    def nominal_force(self) -> Scalar:
         """Force [N] at one micrometer beyond the gap."""
         return self.law.nominal_force

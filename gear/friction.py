@@ -3,17 +3,17 @@
 from dataclasses import dataclass
 from typing import Protocol
 
-from gear.quantities import Coefficient, check
+from gear.quantities import Coefficient, Scalar, check
 
 
 class FrictionLaw(Protocol):
     """What a mesh asks of its friction law; the direction of motion is the mesh's business, not the law's."""
 
-    def coefficient(self, speed: float, force: float) -> float:
+    def coefficient(self, speed: Scalar, force: Scalar) -> Scalar:
         """Sliding coefficient [-] at mesh speed >= 0 [m/s] under normal force >= 0 [N]."""
         ...
 
-    def breakaway(self, force: float) -> float:
+    def breakaway(self, force: Scalar) -> Scalar:
         """Largest coefficient [-] that holds the mesh at rest under normal force >= 0 [N]."""
         ...
 
@@ -46,10 +46,10 @@ class Coulomb:
                 "a breakaway coefficient below the sliding one has no consistent motion at standstill"
             )
 
-    def coefficient(self, speed: float, force: float) -> float:
+    def coefficient(self, speed: Scalar, force: Scalar) -> Scalar:
         """Sliding coefficient [-], the same at every speed and force."""
         return self.sliding
 
-    def breakaway(self, force: float) -> float:
+    def breakaway(self, force: Scalar) -> Scalar:
         """Coefficient [-] that holds the mesh at rest."""
         return self.static

@@ -6,7 +6,7 @@ from typing import NamedTuple, Protocol
 
 import casadi as ca
 
-from gear.quantities import Arm, Factor, Length, Number, PressureAngle, check
+from gear.quantities import Arm, Factor, Length, Number, PressureAngle, Scalar, check
 
 
 class Pair(Protocol):
@@ -17,17 +17,34 @@ class Pair(Protocol):
     """
 
     @property
-    def radius_a(self) -> float: ...
+    def radius_a(self) -> Scalar:
+        """Pitch radius [m] of wheel A."""
+        ...
+
     @property
-    def radius_b(self) -> float: ...
+    def radius_b(self) -> Scalar:
+        """Pitch radius [m] of wheel B."""
+        ...
+
     @property
-    def pressure_angle(self) -> float: ...
+    def pressure_angle(self) -> Scalar:
+        """Working transverse pressure angle [rad]."""
+        ...
+
     @property
-    def friction_factor(self) -> float: ...
+    def friction_factor(self) -> Scalar:
+        """d_F [-]."""
+        ...
+
     @property
-    def friction_arm_a(self) -> float: ...
+    def friction_arm_a(self) -> Scalar:
+        """-d_tauA [m]."""
+        ...
+
     @property
-    def friction_arm_b(self) -> float: ...
+    def friction_arm_b(self) -> Scalar:
+        """d_tauB [m]."""
+        ...
 
 
 class Path(NamedTuple):
@@ -99,12 +116,12 @@ class ExternalPair:
             )
 
     @property
-    def radius_a(self) -> float:
+    def radius_a(self) -> Scalar:
         """Pitch radius [m] of wheel A."""
         return self.module * self.teeth_a / 2
 
     @property
-    def radius_b(self) -> float:
+    def radius_b(self) -> Scalar:
         """Pitch radius [m] of wheel B."""
         return self.module * self.teeth_b / 2
 
@@ -123,19 +140,19 @@ class ExternalPair:
         )
 
     @property
-    def friction_factor(self) -> float:
+    def friction_factor(self) -> Scalar:
         """Averaged friction force on the bearings per unit of friction scalar, d_F [-]."""
         path = self.path()
         return (2 * path.pitch - path.start - path.end) / (path.end - path.start)
 
     @property
-    def friction_arm_a(self) -> float:
+    def friction_arm_a(self) -> Scalar:
         """Averaged lever arm of the friction on wheel A, -d_tauA [m]."""
         path = self.path()
         return -(2 * path.pitch**2 - path.start**2 - path.end**2) / (2 * (path.end - path.start))
 
     @property
-    def friction_arm_b(self) -> float:
+    def friction_arm_b(self) -> Scalar:
         """Averaged lever arm of the friction on wheel B, d_tauB [m]."""
         path = self.path()
         pitch, start, end = (path.length - distance for distance in path[1:])

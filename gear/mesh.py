@@ -8,6 +8,7 @@ import casadi as ca
 from gear.elasticity import Backlash, Linear
 from gear.friction import Coulomb
 from gear.geometry import ExternalPair, GivenPair
+from gear.quantities import Scalar
 
 MESH_SPEED_NOMINAL = 1e-2  # m/s
 
@@ -67,35 +68,37 @@ class Mesh:
     stick_by: Literal["mesh speed", "conjugate speed"] = "mesh speed"
 
     def __post_init__(self) -> None:
-        if len({self.a, self.b, self.carrier}) < 3:
-            raise ValueError(f"Mesh needs three different shafts, got a={self.a!r}, b={self.b!r}, carrier={self.carrier!r}")
+        if self.a == self.b or self.carrier in (self.a, self.b):
+            raise ValueError(
+                f"Mesh needs three different shafts, got a={self.a!r}, b={self.b!r}, carrier={self.carrier!r}"
+            )
         if self.stick_by not in ("mesh speed", "conjugate speed"):
             raise ValueError(f'Mesh.stick_by must be "mesh speed" or "conjugate speed", got {self.stick_by!r}')
 
-    def _per_shaft(self, a: float, b: float) -> dict[str, float]:
+    def _per_shaft(self, a: Scalar, b: Scalar) -> dict[str, Scalar]:
         """Coefficients on the absolute motion of the shafts, from those on the motion relative to the carrier."""
         return {self.a: a, self.b: b} | ({} if self.carrier is None else {self.carrier: -(a + b)})
 
-    def deflection_per_shaft(self) -> dict[str, float]:
+    def deflection_per_shaft(self) -> dict[str, Scalar]:
         """Deflection [m] per angle [rad] of each shaft."""
         return self._per_shaft(self.pair.radius_a, self.pair.radius_b)
 
-    def slip_per_shaft(self) -> dict[str, float]:
+    def slip_per_shaft(self) -> dict[str, Scalar]:
         """Speed that friction opposes [m/s] per speed [rad/s] of each shaft, by `stick_by`."""
         if self.stick_by == "conjugate speed":
             return self._per_shaft(self.pair.friction_arm_a, -self.pair.friction_arm_b)
         return self._per_shaft(self.pair.radius_a / 2, -self.pair.radius_b / 2)
 
-    def torque_per_normal(self) -> dict[str, float]:
+    def torque_per_normal(self) -> dict[str, Scalar]:
         """Torque [N m] on each shaft per normal force [N]: the base radii, T_A = -F_n l_A, T_B = -F_n l_B."""
         cosine = ca.cos(self.pair.pressure_angle)
         return self._per_shaft(-self.pair.radius_a * cosine, -self.pair.radius_b * cosine)
 
-    def torque_per_friction(self) -> dict[str, float]:
+    def torque_per_friction(self) -> dict[str, Scalar]:
         """Torque [N m] on each shaft per friction scalar [N]: T_A = -s e_A, T_B = +s e_B."""
         return self._per_shaft(-self.pair.friction_arm_a, self.pair.friction_arm_b)
 
-    def bearing_force(self, normal: float, friction: float, flank: float) -> BearingForce:
+    def bearing_force(self, normal: Scalar, friction: Scalar, flank: Scalar) -> BearingForce:
         """Planar load [N] on the bearing of wheel B from signed normal force and friction scalar.
 
             F_B = |F_n| (sin alpha, flank cos alpha) + s d_F (flank cos alpha, -sin alpha)

@@ -11,6 +11,8 @@ from typing import Annotated, Any, get_type_hints
 
 from annotated_types import Ge, Gt, Le, Lt, Unit
 
+Scalar = Any  # a float, or a CasADi expression of one: laws are written once for both
+
 Number = Annotated[float, Unit("-")]
 Coefficient = Annotated[float, Unit("-"), Ge(0)]
 Factor = Annotated[float, Unit("-"), Gt(0)]

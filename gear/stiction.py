@@ -24,10 +24,11 @@ D. E. Stewart, "Rigid-body dynamics with friction and impact", SIAM Review 42 (2
 M. Hintermueller, K. Ito, K. Kunisch, "The primal-dual active set strategy", SIAM J. Optim. 13 (2002).
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 
+Matrix = Any  # of CasADi: SX inside the sweeps, MX around them, and plain numbers become DM
 STUCK, FORWARD, BACKWARD, AT_LIMIT = 0, 1, -1, 2  # motion of a contact; AT_LIMIT is +2 or -2
 
 REGULARIZATION = 1e-8  # of G where contacts are redundant; refined away, see `friction`
@@ -36,7 +37,7 @@ INDEPENDENT = 1e-5  # a contact can slip by itself if the others leave this part
 RELEASED = 1 - 1e-6  # a contact that has just let go is not to hold again at the very same limit
 
 
-def friction(compliance: ca.SX, demand: ca.SX, held: ca.SX, given: ca.SX, redundant: bool) -> ca.SX:
+def friction(compliance: Matrix, demand: Matrix, held: Matrix, given: Matrix, redundant: bool) -> Matrix:
     """Friction scalars: those of `held` contacts from a = 0, the others as `given`.
 
     Parameters
@@ -94,20 +95,20 @@ def _substitute(lower: dict, upper: list[list[ca.SX]], right: ca.SX) -> ca.SX:
 class RestProblem(NamedTuple):
     """What the joint decision is about; all (K, 1) except `compliance` (K, K)."""
 
-    compliance: ca.SX  # G
-    demand: ca.SX  # slip acceleration without contact friction
-    static: ca.SX  # friction limit at rest, >= 0
-    sliding: ca.SX  # friction limit at the onset of sliding, 0 <= sliding <= static
-    rest: ca.SX  # 1 where the slip speed is zero and the contact takes part in the decision
-    given: ca.SX  # friction scalar of the contacts that do not
-    released: ca.SX  # 1 where the contact has just let go
+    compliance: Matrix  # G
+    demand: Matrix  # slip acceleration without contact friction
+    static: Matrix  # friction limit at rest, >= 0
+    sliding: Matrix  # friction limit at the onset of sliding, 0 <= sliding <= static
+    rest: Matrix  # 1 where the slip speed is zero and the contact takes part in the decision
+    given: Matrix  # friction scalar of the contacts that do not
+    released: Matrix  # 1 where the contact has just let go
 
 
 class Decision(NamedTuple):
     """`motion` per contact at rest (STUCK, +-1 slips, +-AT_LIMIT) and whether the sweeps agreed (else 1)."""
 
-    motion: ca.MX
-    fault: ca.MX
+    motion: Matrix
+    fault: Matrix
 
 
 def decide(problem: RestProblem, redundant: bool) -> Decision:
@@ -118,7 +119,8 @@ def decide(problem: RestProblem, redundant: bool) -> Decision:
     """
     count = problem.demand.shape[0]
     sweep = _sweep_function(count, redundant)
-    status, broken = ca.MX.zeros(count), problem.released
+    status: Matrix = ca.MX.zeros(count)
+    broken = problem.released
     sweeps = 4 * count + 2
     for number in range(sweeps):
         # every violator at once is fast; one at a time cannot cycle (K. G. Murty, 1974), so it comes last
@@ -159,7 +161,10 @@ def _sweep_function(count: int, redundant: bool) -> ca.Function:
     motion = status * ca.if_else(slips, 1, AT_LIMIT)
     done = ca.logic_and(settled, ca.logic_not(ca.sum1(ca.fabs(loosened - broken))))
     return ca.Function(
-        "sweep", [status, broken, single, *problem], [ca.vertcat(*first), loosened, motion, done], {"never_inline": True}
+        "sweep",
+        [status, broken, single, *problem],
+        [ca.vertcat(*first), loosened, motion, done],
+        {"never_inline": True},
     )
 
 

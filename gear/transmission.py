@@ -8,9 +8,11 @@ import casadi as ca
 import numpy as np
 
 from gear.mesh import MESH_SPEED_NOMINAL, Mesh
+from gear.quantities import Scalar
 from gear.shafts import Bearing, Coupling, Shaft
 
 BEARING_SPEED_NOMINAL = 1.0  # rad/s
+RANK = 1e-9  # part of the largest singular value that counts as zero
 BEARING_TORQUE_FLOOR = 1e-3  # N m; keeps the scale of a frictionless bearing finite
 
 
@@ -122,34 +124,36 @@ class Transmission:
         names = list(self.shafts)
         motions = _null_space(self._matrix(rigid)) if rigid else np.eye(len(names))
         ends = motions[[names.index(self.input), names.index(self.output)]]
-        if np.linalg.matrix_rank(ends, tol=1e-9) != 1 or abs(ends[1]).max() < 1e-9:
+        if np.linalg.matrix_rank(ends, tol=RANK) != 1 or abs(ends[1]).max() < RANK:
             raise ValueError(
                 f"Transmission: shafts {self.input!r} (input) and {self.output!r} (output) are not joined by one speed "
                 "ratio; every shaft between them needs a mesh or a coupling, and a carrier its own connection"
             )
         moving = motions[:, int(abs(ends[1]).argmax())]
-        return {name: float(turns) for name, turns in zip(names, moving / moving[names.index(self.output)], strict=True)}
+        return {
+            name: float(turns) for name, turns in zip(names, moving / moving[names.index(self.output)], strict=True)
+        }
 
-    def _matrix(self, rows: list[dict[str, float]]) -> np.ndarray:
+    def _matrix(self, rows: list[dict[str, Scalar]]) -> np.ndarray:
         """Coefficients per shaft as a matrix, each row scaled to one."""
         table = np.array([[float(row.get(name, 0.0)) for name in self.shafts] for row in rows])
         return table / np.linalg.norm(table, axis=1, keepdims=True) if rows else np.zeros((0, len(self.shafts)))
 
-    def deflections(self, motion: Mapping[str, float]) -> dict[str, float]:
+    def deflections(self, motion: Mapping[str, Scalar]) -> dict[str, Scalar]:
         """Deflection of each mesh [m], or its rate [m/s], from the angles or speeds of the shafts."""
         return {
             name: sum(factor * motion[shaft] for shaft, factor in mesh.deflection_per_shaft().items())
             for name, mesh in self.meshes.items()
         }
 
-    def normal_forces(self, angle: Mapping, speed: Mapping, flank: Mapping[str, float]) -> dict[str, float]:
+    def normal_forces(self, angle: Mapping, speed: Mapping, flank: Mapping[str, Scalar]) -> dict[str, Scalar]:
         """Signed normal force [N] of each mesh on its present flank."""
         deflection, rate = self.deflections(angle), self.deflections(speed)
         return {
             name: mesh.elasticity.force(deflection[name], rate[name], flank[name]) for name, mesh in self.meshes.items()
         }
 
-    def torques(self, angle: Mapping, speed: Mapping, normal: Mapping[str, float]) -> dict[str, float]:
+    def torques(self, angle: Mapping, speed: Mapping, normal: Mapping[str, Scalar]) -> dict[str, Scalar]:
         """Torque on each shaft [N m] from teeth, couplings and viscous drag, without what can stick."""
         torque = dict.fromkeys(self.shafts, 0.0)
         for name, mesh in self.meshes.items():
@@ -165,7 +169,9 @@ class Transmission:
             torque[bearing.shaft] -= bearing.viscous * speed[bearing.shaft]
         return torque
 
-    def friction_limits(self, normal: Mapping[str, float], slip: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+    def friction_limits(
+        self, normal: Mapping[str, Scalar], slip: Mapping[str, Scalar]
+    ) -> dict[str, tuple[Scalar, Scalar]]:
         """Per contact the friction limit at rest and the friction while sliding at `slip` >= 0, both >= 0."""
         limits = {}
         for name, mesh in self.meshes.items():
@@ -179,7 +185,7 @@ class Transmission:
             limits[f"bearings.{name}"] = (bearing.breakaway, bearing.coulomb)
         return limits
 
-    def elastic_energy(self, angle: Mapping, flank: Mapping[str, float]) -> float:
+    def elastic_energy(self, angle: Mapping, flank: Mapping[str, Scalar]) -> Scalar:
         """Energy [J] stored in teeth and couplings.
 
         The deflection is measured on the pitch circle and the force acts along the line of action, so a
@@ -194,18 +200,20 @@ class Transmission:
         return stored
 
 
-def _require_positive_stuck_inertia(name: str, mesh: Mesh, inertia: Mapping[str, float]) -> None:
+def _require_positive_stuck_inertia(name: str, mesh: Mesh, inertia: Mapping[str, Scalar]) -> None:
+    if mesh.stick_by == "conjugate speed":
+        return
     slip, torque = mesh.slip_per_shaft(), mesh.torque_per_friction()
     mobility = -sum(float(slip[shaft] * torque[shaft]) / inertia[shaft] for shaft in slip)
     if mobility <= 0:
         raise ValueError(
-            f'Transmission: mesh {name!r} cannot stick by "mesh speed": its friction would speed up the slip it opposes '
-            f"({-mobility:.4g} m/s^2 per N with the inertias given); use stick_by='conjugate speed'"
+            f'Transmission: mesh {name!r} cannot stick by "mesh speed": its friction would speed up the slip it '
+            f"opposes ({-mobility:.4g} m/s^2 per N with the inertias given); use stick_by='conjugate speed'"
         )
 
 
 def _null_space(matrix: np.ndarray) -> np.ndarray:
     """Orthonormal motions that leave every row of `matrix` at zero, one per column."""
     _, values, rows = np.linalg.svd(matrix)
-    rank = int((values > 1e-9 * values.max()).sum())
+    rank = int((values > RANK * values.max()).sum())
     return rows[rank:].T

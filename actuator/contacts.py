@@ -25,14 +25,14 @@ class ContactModes(NamedTuple):
 class ContactForces(NamedTuple):
     """All that the contacts of a transmission do at one state; vectors are (K, 1) in the order of the contacts."""
 
-    normal: dict[str, ca.SX]  # signed normal force per mesh [N]
-    slip: ca.SX  # slip speed
-    static: ca.SX  # friction limit at rest
-    sliding: ca.SX  # friction while sliding at the present speed
-    compliance: ca.SX  # G of the joint decision
-    demand: ca.SX  # slip acceleration without contact friction
-    friction: ca.SX  # the friction scalars of the present modes
-    acceleration: dict[str, ca.SX]  # per shaft [rad/s^2]
+    normal: dict[str, Matrix]  # signed normal force per mesh [N]
+    slip: Matrix  # slip speed
+    static: Matrix  # friction limit at rest
+    sliding: Matrix  # friction while sliding at the present speed
+    compliance: Matrix  # G of the joint decision
+    demand: Matrix  # slip acceleration without contact friction
+    friction: Matrix  # the friction scalars of the present modes
+    acceleration: dict[str, Matrix]  # per shaft [rad/s^2]
 
 
 class ContactMechanics:

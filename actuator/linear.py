@@ -176,7 +176,7 @@ def margins(loop: control.StateSpace, frequencies: np.ndarray = GRID) -> Margins
     gain_crossings = _roots(lambda w: abs(response(w)) - 1, frequencies, abs(values) - 1)
     # on the negative real axis the imaginary part changes sign, away from it the branch at 0 deg does too
     phase_crossings = [
-        w for w in _roots(lambda w: response(w).imag, frequencies, values.imag) if response(w).real < -NOTHING
+        w for w in _roots(lambda w: response(w).imag, frequencies, np.imag(values)) if response(w).real < -NOTHING
     ]
     gains = [(-1 / response(w).real, w) for w in phase_crossings]
     phases = [((math.pi + np.angle(response(w))) % (2 * math.pi), w) for w in gain_crossings]

@@ -141,7 +141,7 @@ class _Assembly:
             parameters=tuple(parameters),
             travel=_travel(actuator.gear),
             flow=ca.Function("flow", arguments, [ca.vertcat(*(rates[state.name] for state in self.states))]),
-            margins=ca.Function("margins", arguments, [self.contacts.margins(angle, forces, modes)]),
+            margins=ca.Function("margins", arguments, [self.contacts.margins(forces, modes)]),
             reset=self._whole_reset(settle, arguments),
             outputs_function=ca.Function(
                 "outputs", arguments, [ca.vertcat(*(value for _, value in self.outputs.values()))]
@@ -282,7 +282,6 @@ class _Assembly:
             self._output(f"{side}_angle", "rad", angle[shaft])
             self._output(f"{side}_speed", "rad/s", speed[shaft])
         self._output("motor_angle_at_load", "rad", angle[gear.input] / self.ratio)
-        deflections = gear.deflections(angle)
         for k, contact in enumerate(self.contacts.contacts):
             name = contact.name.split(".")[1]
             is_mesh = contact.name.startswith("meshes.")
@@ -293,12 +292,12 @@ class _Assembly:
             if is_mesh:
                 mesh, normal = gear.meshes[name], forces.normal[name]
                 self._output(f"gear.{contact.name}.normal_force", "N", normal)
-                self._output(f"gear.{contact.name}.deflection", "m", deflections[name])
+                self._output(f"gear.{contact.name}.deflection", "m", forces.motions[name].deflection)
                 bearing = mesh.bearing_force(normal, forces.friction[k], modes.flank[name])
                 self._output(f"gear.{contact.name}.bearing_force_x", "N", bearing.x)
                 self._output(f"gear.{contact.name}.bearing_force_y", "N", bearing.y)
         kinetic = sum(self.inertia[shaft] * speed[shaft] ** 2 / 2 for shaft in gear.shafts)
-        self._output("mechanical_energy", "J", kinetic + gear.elastic_energy(angle, modes.flank))
+        self._output("mechanical_energy", "J", kinetic + gear.elastic_energy(forces.motions, angle, modes.flank))
 
     def _whole_reset(self, settle: ca.Function, arguments: list[ca.SX]) -> ca.Function:
         """Reset of the mechanics, everything else unchanged; speeds are the last states."""

@@ -6,9 +6,10 @@ from typing import NamedTuple
 import casadi as ca
 
 from actuator.hybrid import MARGIN_BAND
-from gear.elasticity import DEFLECTION_NOMINAL
+from gear.elasticity import DEFLECTION_NOMINAL, has_gap
+from gear.motion import MeshMotion
 from gear.quantities import Scalar
-from gear.stiction import AT_LIMIT, Matrix, RestProblem, decide, friction
+from gear.stiction import AT_LIMIT, BACKWARD, FORWARD, Matrix, RestProblem, decide, friction
 from gear.transmission import Contact, Transmission
 
 REST_SPEED = 10 * MARGIN_BAND  # part of a contact's usual slip speed that counts as standing still
@@ -25,6 +26,7 @@ class ContactModes(NamedTuple):
 class ContactForces(NamedTuple):
     """All that the contacts of a transmission do at one state; vectors are (K, 1) in the order of the contacts."""
 
+    motions: dict[str, MeshMotion]  # per mesh
     normal: dict[str, Matrix]  # signed normal force per mesh [N]
     slip: Matrix  # slip speed
     static: Matrix  # friction limit at rest
@@ -51,7 +53,7 @@ class ContactMechanics:
     def __init__(self, gear: Transmission, redundant: bool, inertia: Mapping[str, Scalar]) -> None:
         self.gear, self.redundant, self.inertia = gear, redundant, inertia
         self.contacts: list[Contact] = gear.contacts()
-        self.gaps = {name: mesh.elasticity.total_gap for name, mesh in gear.meshes.items()}
+        self.laws = {name: mesh.law() for name, mesh in gear.meshes.items()}
 
     def mode_names(self) -> list[str]:
         """Names of the mode variables: a motion per contact, a flank per mesh."""
@@ -73,12 +75,13 @@ class ContactMechanics:
         """Friction and accelerations in the given modes, with `torque` per shaft from outside."""
         direction = ca.sign(modes.motion)
         slip = self.slip_speeds(speed)
-        normal = self.gear.normal_forces(angle, speed, modes.flank)
+        motions = self.gear.motions(angle, speed)
+        normal = self.gear.normal_forces(motions, modes.flank)
         smooth = self.gear.torques(angle, speed, normal)
         free = {shaft: (smooth[shaft] + torque.get(shaft, 0)) / self.inertia[shaft] for shaft in self.gear.shafts}
         demand = ca.vertcat(*(sum(c * free[shaft] for shaft, c in contact.slip.items()) for contact in self.contacts))
         compliance = self.compliance()
-        static, sliding = self.limits(normal, direction * slip, modes)
+        static, sliding = self.limits(motions, normal, direction * slip, direction, modes)
         at_limit = ca.eq(ca.fabs(modes.motion), AT_LIMIT)
         given = direction * ca.if_else(at_limit, static, sliding)
         held = ca.eq(direction, 0) * self._engaged(modes)
@@ -91,7 +94,7 @@ class ContactMechanics:
             / self.inertia[shaft]
             for shaft in self.gear.shafts
         }
-        return ContactForces(normal, slip, static, sliding, compliance, demand, scalar, acceleration)
+        return ContactForces(motions, normal, slip, static, sliding, compliance, demand, scalar, acceleration)
 
     def compliance(self) -> Matrix:
         """G of the joint decision: slip acceleration of contact i per unit of friction against it in contact k."""
@@ -104,10 +107,13 @@ class ContactMechanics:
                     matrix[i, k] = -sum(row.slip[s] * column.torque[s] / self.inertia[s] for s in shared)
         return matrix
 
-    def limits(self, normal: Mapping, speed: Matrix, modes: ContactModes) -> tuple[ca.SX, ca.SX]:
-        """Friction limits at rest and while sliding at `speed` >= 0; zero in a gap."""
-        named = {contact.name: ca.fmax(speed[k], 0) for k, contact in enumerate(self.contacts)}
-        pairs = self.gear.friction_limits(normal, named)
+    def limits(
+        self, motions: Mapping, normal: Mapping, speed: Matrix, direction: Matrix, modes: ContactModes
+    ) -> tuple[Matrix, Matrix]:
+        """Friction limits at rest and while sliding at `speed` >= 0 in `direction`; zero in a gap."""
+        names = [contact.name for contact in self.contacts]
+        slip = {name: ca.fmax(speed[k], 0) for k, name in enumerate(names)}
+        pairs = self.gear.friction_limits(motions, normal, slip, {name: direction[k] for k, name in enumerate(names)})
         engaged = self._engaged(modes)
         static, sliding = (ca.vertcat(*(pairs[contact.name][j] for contact in self.contacts)) for j in (0, 1))
         return engaged * static, engaged * sliding
@@ -126,18 +132,18 @@ class ContactMechanics:
     def margin_names(self) -> list[str]:
         """Two margins per contact, two per mesh with a gap and one per mesh without."""
         names = [f"gear.{contact.name} {end}" for contact in self.contacts for end in ("upper", "lower")]
-        for name, gap in self.gaps.items():
-            names += [f"gear.meshes.{name} {side}" for side in (("flank",) if gap is None else ("flank +", "flank -"))]
+        for name, law in self.laws.items():
+            sides = ("flank +", "flank -") if has_gap(law) else ("flank",)
+            names += [f"gear.meshes.{name} {side}" for side in sides]
         return names
 
-    def margins(self, angle: Mapping, forces: ContactForces, modes: ContactModes) -> Matrix:
+    def margins(self, forces: ContactForces, modes: ContactModes) -> Matrix:
         """Margins in the order of `margin_names`.
 
         stuck:    (static - s) and (static + s), over a usual friction force
         sliding:  direction * slip speed, over a usual speed
         flank:    flank * F_n without a gap, else the penetration or the distance to the flank
         """
-        deflection = self.gear.deflections(angle)
         rows = []
         engaged = self._engaged(modes)
         for k, contact in enumerate(self.contacts):
@@ -149,13 +155,13 @@ class ContactMechanics:
                 ca.if_else(stuck, room[0], ca.if_else(slides, speed, INACTIVE)),
                 ca.if_else(stuck, room[1], INACTIVE),
             ]
-        for name, gap in self.gaps.items():
+        for name, law in self.laws.items():
             flank = modes.flank[name]
-            if gap is None:
-                rows.append(flank * forces.normal[name] / self.gear.meshes[name].elasticity.nominal_force)
+            if not has_gap(law):
+                rows.append(flank * forces.normal[name] / law.nominal_force())
                 continue
             for side in (1, -1):
-                beyond = (side * deflection[name] - gap / 2) / DEFLECTION_NOMINAL
+                beyond = law.penetration(forces.motions[name], side) / DEFLECTION_NOMINAL
                 rows.append(ca.if_else(ca.eq(flank, side), beyond, ca.if_else(ca.eq(flank, 0), -beyond, INACTIVE)))
         return ca.vertcat(*rows) + MARGIN_BAND
 
@@ -163,17 +169,18 @@ class ContactMechanics:
 
     def flanks_after(self, fired: Matrix, angle: Mapping, speed: Mapping, before: Mapping[str, Scalar]) -> list[ca.SX]:
         """Flank of each mesh after an event; from the deflection where the event was elsewhere."""
-        deflection = self.gear.deflections(angle)
+        motions = self.gear.motions(angle, speed)
         row, found = 2 * len(self.contacts), []
-        for name, gap in self.gaps.items():
-            if gap is None:
-                force = self.gear.normal_forces(angle, speed, before)[name]
+        for name, law in self.laws.items():
+            if not has_gap(law):
+                force = law.force(motions[name], before[name])
                 kept = ca.if_else(ca.fabs(force) > 0, ca.sign(force), 1)
                 turned = ca.if_else(ca.eq(before[name], 0), kept, -before[name])
                 found.append(ca.if_else(fired[row], turned, kept))
                 row += 1
                 continue
-            sides = ca.if_else(deflection[name] > gap / 2, 1, ca.if_else(deflection[name] < -gap / 2, -1, 0))
+            deep = [law.penetration(motions[name], side) > 0 for side in (1, -1)]
+            sides = ca.if_else(deep[0], 1, ca.if_else(deep[1], -1, 0))
             # the flank that fired: engaged if it was in the gap, in the gap if it was engaged
             plus = ca.if_else(ca.eq(before[name], 0), 1, 0)
             minus = ca.if_else(ca.eq(before[name], 0), -1, 0)
@@ -197,12 +204,16 @@ class ContactMechanics:
             rest.append(ca.logic_or(slow, hit))
             released.append(ca.logic_and(hit, was_stuck))
         resting = ca.vertcat(*rest) * self._engaged(modes)
-        onset = self.limits(forces.normal, ca.SX.zeros(len(self.contacts)), modes)[1]
+        still = ca.SX.zeros(len(self.contacts))
+        onset = [
+            self.limits(forces.motions, forces.normal, still, still + end, modes)[1] for end in (FORWARD, BACKWARD)
+        ]
         return RestProblem(
             compliance=forces.compliance,
             demand=forces.demand,
             static=forces.static,
-            sliding=onset,
+            forward=onset[0],
+            backward=onset[1],
             rest=resting,
             given=direction * forces.sliding,
             released=ca.vertcat(*released),

@@ -18,7 +18,7 @@ from actuator.hybrid import HybridSystem
 from actuator.signals import Piece
 from actuator.window import INTERVALS, LOG_SLOTS, InputForm, ModeCode, window_function
 
-VIOLATION = 1e-6  # a margin below minus this is a missed event, not rounding
+VIOLATION = 1e-9  # a margin below minus this is a missed event, not rounding
 FINEST_WINDOW = 1e-7  # s; a window that fails at this length is a failure of the model
 
 

@@ -1,17 +1,18 @@
 """Elasticity of the teeth: normal force as a function of mesh deformation, and of the gap between flanks."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import casadi as ca
 
+from gear.motion import MeshMotion
 from gear.quantities import Damping, Distance, Scalar, Stiffness, check
 
 DEFLECTION_NOMINAL = 1e-6  # m; teeth under load bend by about a micrometer
 
 
 class ToothSpring(Protocol):
-    """An elastic tooth contact without gap; `Backlash` wraps one."""
+    """Teeth in contact: odd functions of the deflection, without a gap. `Backlash` puts a gap around one."""
 
     def spring(self, deflection: Scalar) -> Scalar:
         """Elastic force [N]."""
@@ -22,39 +23,47 @@ class ToothSpring(Protocol):
         ...
 
     def energy(self, deflection: Scalar) -> Scalar:
-        """Work [J/m per m of travel] stored by `spring`, its integral from zero."""
+        """Integral of `spring` over the deflection from zero [J]."""
         ...
 
 
+@runtime_checkable
 class ElasticityLaw(Protocol):
     """What a mesh asks of its elasticity.
 
     The flank (+1: A pushes B towards positive travel, -1: the opposite flank, 0: in the gap) is a mode of
-    the mesh; a law says the force on a given flank and, by its gap, where flanks engage.
+    the mesh; a law says the force on a given flank, and where flanks engage.
     """
 
-    def force(self, deflection: Scalar, rate: Scalar, flank: Scalar) -> Scalar:
+    def force(self, motion: MeshMotion, flank: Scalar) -> Scalar:
         """Normal force [N], positive when A pushes B towards positive travel."""
         ...
 
-    def energy(self, deflection: Scalar, flank: Scalar) -> Scalar:
+    def stored(self, motion: MeshMotion, flank: Scalar) -> Scalar:
         """Integral of the elastic force over the deflection [J]."""
         ...
 
-    @property
-    def total_gap(self) -> Scalar | None:
-        """Total gap between the flanks [m], or None for a law without one."""
+    def penetration(self, motion: MeshMotion, flank: Scalar) -> Scalar:
+        """How far the teeth are pressed into each other on a flank [m], negative in the gap.
+
+        None (for every motion) where the teeth cannot lose contact.
+        """
         ...
 
-    @property
     def nominal_force(self) -> Scalar:
         """Size of a usual normal force [N], for scaling."""
         ...
 
 
+def has_gap(law: ElasticityLaw) -> bool:
+    """Whether flanks can lose contact: the law knows a penetration."""
+    at_rest = MeshMotion(*(0.0 for _ in MeshMotion._fields))
+    return law.penetration(at_rest, 1.0) is not None
+
+
 @dataclass(frozen=True, kw_only=True)
 class Linear:
-    """Linear spring and damper, on both flanks, without a gap.
+    """Linear spring and damper.
 
         F_n = stiffness * deflection + damping * rate
 
@@ -84,23 +93,35 @@ class Linear:
         """Damping force [N]."""
         return self.damping * rate
 
-    def force(self, deflection: Scalar, rate: Scalar, flank: Scalar) -> Scalar:
-        """Normal force [N]; the same expression on both flanks."""
-        return self.spring(deflection) + self.damper(deflection, rate)
-
-    def energy(self, deflection: Scalar, flank: Scalar = 1.0) -> Scalar:
+    def energy(self, deflection: Scalar) -> Scalar:
         """Integral of the elastic force over the deflection [J]."""
         return self.stiffness * deflection**2 / 2
 
-    @property
-    def total_gap(self) -> None:
+
+@dataclass(frozen=True, kw_only=True)
+class Gapless:
+    """A tooth spring on both flanks: what a mesh makes of one that is given without a gap.
+
+    F_n = spring(deflection) + damper(deflection, rate)
+    """
+
+    law: ToothSpring
+
+    def force(self, motion: MeshMotion, flank: Scalar) -> Scalar:
+        """Normal force [N]; the same expression on both flanks."""
+        return self.law.spring(motion.deflection) + self.law.damper(motion.deflection, motion.rate)
+
+    def stored(self, motion: MeshMotion, flank: Scalar) -> Scalar:
+        """Integral of the elastic force over the deflection [J]."""
+        return self.law.energy(motion.deflection)
+
+    def penetration(self, motion: MeshMotion, flank: Scalar) -> None:
         """None: the teeth are always in contact."""
         return None
 
-    @property
     def nominal_force(self) -> Scalar:
         """Force [N] at a deflection of one micrometer."""
-        return self.stiffness * DEFLECTION_NOMINAL
+        return self.law.spring(DEFLECTION_NOMINAL)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,28 +157,26 @@ class Backlash:
     def __post_init__(self) -> None:
         check(self)
 
-    def force(self, deflection: Scalar, rate: Scalar, flank: Scalar) -> Scalar:
+    def force(self, motion: MeshMotion, flank: Scalar) -> Scalar:
         """Normal force [N] on the given flank; zero for flank 0.
 
         An engaged flank is one with penetration >= 0. The expression goes on below zero with the same slope,
         where no run comes, so that a search for an operating point finds its way back to contact.
         """
-        penetration = flank * deflection - self.gap / 2
+        penetration = self.penetration(motion, flank)
         spring = self.law.spring(penetration)
         limit = ca.fabs(spring)
-        damper = self.law.damper(penetration, flank * rate)
+        damper = self.law.damper(penetration, flank * motion.rate)
         return flank * (spring + ca.fmax(-limit, ca.fmin(limit, damper)))
 
-    def energy(self, deflection: Scalar, flank: Scalar) -> Scalar:
+    def stored(self, motion: MeshMotion, flank: Scalar) -> Scalar:
         """Integral of the elastic force over the deflection [J]."""
-        return self.law.energy(ca.fmax(flank * deflection - self.gap / 2, 0))
+        return self.law.energy(ca.fmax(self.penetration(motion, flank), 0))
 
-    @property
-    def total_gap(self) -> Scalar:
-        """Total gap [m]."""
-        return self.gap
+    def penetration(self, motion: MeshMotion, flank: Scalar) -> Scalar:
+        """How far the teeth are pressed into each other on a flank [m]."""
+        return flank * motion.deflection - self.gap / 2
 
-    @property
     def nominal_force(self) -> Scalar:
         """Force [N] at one micrometer beyond the gap."""
-        return self.law.nominal_force
+        return self.law.spring(DEFLECTION_NOMINAL)

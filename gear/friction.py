@@ -3,18 +3,19 @@
 from dataclasses import dataclass
 from typing import Protocol
 
+from gear.motion import Sliding
 from gear.quantities import Coefficient, Scalar, check
 
 
 class FrictionLaw(Protocol):
     """What a mesh asks of its friction law; the direction of motion is the mesh's business, not the law's."""
 
-    def coefficient(self, speed: Scalar, force: Scalar) -> Scalar:
-        """Sliding coefficient [-] at mesh speed >= 0 [m/s] under normal force >= 0 [N]."""
+    def coefficient(self, sliding: Sliding) -> Scalar:
+        """Sliding coefficient [-]."""
         ...
 
-    def breakaway(self, force: Scalar) -> Scalar:
-        """Largest coefficient [-] that holds the mesh at rest under normal force >= 0 [N]."""
+    def breakaway(self, sliding: Sliding) -> Scalar:
+        """Largest coefficient [-] that holds the mesh at rest, at this force, position and driving side."""
         ...
 
 
@@ -46,10 +47,10 @@ class Coulomb:
                 "a breakaway coefficient below the sliding one has no consistent motion at standstill"
             )
 
-    def coefficient(self, speed: Scalar, force: Scalar) -> Scalar:
-        """Sliding coefficient [-], the same at every speed and force."""
+    def coefficient(self, sliding: Sliding) -> Scalar:
+        """Sliding coefficient [-], the same everywhere."""
         return self.sliding
 
-    def breakaway(self, force: Scalar) -> Scalar:
+    def breakaway(self, sliding: Sliding) -> Scalar:
         """Coefficient [-] that holds the mesh at rest."""
         return self.static

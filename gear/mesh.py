@@ -1,13 +1,15 @@
 """A gear mesh: three terminals (wheel A, wheel B, carrier), elastic, with friction that sticks."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import casadi as ca
 
-from gear.elasticity import Backlash, Linear
+from gear.elasticity import Backlash, ElasticityLaw, Gapless, Linear
 from gear.friction import Coulomb
 from gear.geometry import ExternalPair, GivenPair
+from gear.motion import MeshMotion
 from gear.quantities import Scalar
 
 MESH_SPEED_NOMINAL = 1e-2  # m/s
@@ -74,6 +76,27 @@ class Mesh:
             )
         if self.stick_by not in ("mesh speed", "conjugate speed"):
             raise ValueError(f'Mesh.stick_by must be "mesh speed" or "conjugate speed", got {self.stick_by!r}')
+
+    def law(self) -> ElasticityLaw:
+        """The elasticity as a law of the whole mesh; a bare tooth spring acts on both flanks."""
+        return self.elasticity if isinstance(self.elasticity, ElasticityLaw) else Gapless(law=self.elasticity)
+
+    def motion(self, angle: Mapping[str, Scalar], speed: Mapping[str, Scalar]) -> MeshMotion:
+        """Position and motion of the mesh from the angles [rad] and speeds [rad/s] of the shafts."""
+        turn, spin = (0.0, 0.0) if self.carrier is None else (angle[self.carrier], speed[self.carrier])
+        turn_a, turn_b = angle[self.a] - turn, angle[self.b] - turn
+        speed_a, speed_b = speed[self.a] - spin, speed[self.b] - spin
+        r_a, r_b = self.pair.radius_a, self.pair.radius_b
+        return MeshMotion(
+            deflection=r_a * turn_a + r_b * turn_b,
+            rate=r_a * speed_a + r_b * speed_b,
+            position=(r_a * turn_a - r_b * turn_b) / 2,
+            speed=(r_a * speed_a - r_b * speed_b) / 2,
+            turn_a=turn_a,
+            turn_b=turn_b,
+            speed_a=speed_a,
+            speed_b=speed_b,
+        )
 
     def _per_shaft(self, a: Scalar, b: Scalar) -> dict[str, Scalar]:
         """Coefficients on the absolute motion of the shafts, from those on the motion relative to the carrier."""

@@ -8,7 +8,7 @@ other forces known the slip accelerations are linear in the friction scalars:
 A contact at rest has three possibilities, and all contacts at rest must find theirs together:
 
     holds           a_k = 0 and |s_k| <= static_k
-    slips           s_k = +-sliding_k and a_k has that sign           (sliding_k <= static_k)
+    slips           s_k = +forward_k or -backward_k and a_k has that sign     (both <= static_k)
     holds, at limit a_k = 0 because others hold it, s_k = +-static_k  (only where contacts are redundant)
 
 This is a complementarity problem with boxes. It is solved by an active-set method in a fixed number of
@@ -98,7 +98,8 @@ class RestProblem(NamedTuple):
     compliance: Matrix  # G
     demand: Matrix  # slip acceleration without contact friction
     static: Matrix  # friction limit at rest, >= 0
-    sliding: Matrix  # friction limit at the onset of sliding, 0 <= sliding <= static
+    forward: Matrix  # friction at the onset of sliding forward, 0 <= forward <= static
+    backward: Matrix  # and backward
     rest: Matrix  # 1 where the slip speed is zero and the contact takes part in the decision
     given: Matrix  # friction scalar of the contacts that do not
     released: Matrix  # 1 where the contact has just let go
@@ -136,16 +137,17 @@ def _sweep_function(count: int, redundant: bool) -> ca.Function:
     single = ca.SX.sym("single")
     problem = RestProblem(
         ca.SX.sym("compliance", count, count),
-        *(ca.SX.sym(name, count) for name in ("demand", "static", "sliding", "rest", "given", "released")),
+        *(ca.SX.sym(name, count) for name in ("demand", "static", "forward", "backward", "rest", "given", "released")),
     )
-    limit = ca.if_else(broken, problem.sliding * ca.if_else(problem.released, RELEASED, 1), problem.static)
+    fresh = ca.if_else(problem.released, RELEASED, 1)
+    upper, lower = (ca.if_else(broken, fresh * onset, problem.static) for onset in (problem.forward, problem.backward))
     held = problem.rest * ca.eq(status, 0)
     # the regularized problem as it is, not refined: it alone has one solution for the sweeps to settle on
     compliance = problem.compliance * (1 + REGULARIZATION * ca.SX.eye(count)) if redundant else problem.compliance
-    given = ca.if_else(problem.rest, status * limit, problem.given)
+    given = ca.if_else(problem.rest, ca.if_else(status > 0, upper, -lower), problem.given)
     force = friction(compliance, problem.demand, held, given, redundant=False)
     acceleration = problem.demand - compliance @ force
-    exceeds = ca.if_else(ca.fabs(force) > limit, ca.sign(force), 0)
+    exceeds = ca.if_else(force > upper, 1, ca.if_else(force < -lower, -1, 0))
     stays = ca.if_else(status * acceleration < 0, 0, status)
     proposal = problem.rest * ca.if_else(ca.eq(status, 0), exceeds, stays)
 

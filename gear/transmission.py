@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 
 from gear.mesh import MESH_SPEED_NOMINAL, Mesh
+from gear.motion import MeshMotion, Sliding
 from gear.quantities import Scalar
 from gear.shafts import Bearing, Coupling, Shaft
 
@@ -95,7 +96,7 @@ class Transmission:
                     mesh.slip_per_shaft(),
                     mesh.torque_per_friction(),
                     MESH_SPEED_NOMINAL,
-                    mesh.elasticity.nominal_force,
+                    mesh.law().nominal_force(),
                 )
                 for name, mesh in self.meshes.items()
                 if mesh.a == shaft
@@ -139,19 +140,13 @@ class Transmission:
         table = np.array([[float(row.get(name, 0.0)) for name in self.shafts] for row in rows])
         return table / np.linalg.norm(table, axis=1, keepdims=True) if rows else np.zeros((0, len(self.shafts)))
 
-    def deflections(self, motion: Mapping[str, Scalar]) -> dict[str, Scalar]:
-        """Deflection of each mesh [m], or its rate [m/s], from the angles or speeds of the shafts."""
-        return {
-            name: sum(factor * motion[shaft] for shaft, factor in mesh.deflection_per_shaft().items())
-            for name, mesh in self.meshes.items()
-        }
+    def motions(self, angle: Mapping[str, Scalar], speed: Mapping[str, Scalar]) -> dict[str, MeshMotion]:
+        """Position and motion of each mesh from the angles [rad] and speeds [rad/s] of the shafts."""
+        return {name: mesh.motion(angle, speed) for name, mesh in self.meshes.items()}
 
-    def normal_forces(self, angle: Mapping, speed: Mapping, flank: Mapping[str, Scalar]) -> dict[str, Scalar]:
+    def normal_forces(self, motions: Mapping[str, MeshMotion], flank: Mapping[str, Scalar]) -> dict[str, Scalar]:
         """Signed normal force [N] of each mesh on its present flank."""
-        deflection, rate = self.deflections(angle), self.deflections(speed)
-        return {
-            name: mesh.elasticity.force(deflection[name], rate[name], flank[name]) for name, mesh in self.meshes.items()
-        }
+        return {name: mesh.law().force(motions[name], flank[name]) for name, mesh in self.meshes.items()}
 
     def torques(self, angle: Mapping, speed: Mapping, normal: Mapping[str, Scalar]) -> dict[str, Scalar]:
         """Torque on each shaft [N m] from teeth, couplings and viscous drag, without what can stick."""
@@ -170,31 +165,34 @@ class Transmission:
         return torque
 
     def friction_limits(
-        self, normal: Mapping[str, Scalar], slip: Mapping[str, Scalar]
+        self,
+        motions: Mapping[str, MeshMotion],
+        normal: Mapping[str, Scalar],
+        slip: Mapping[str, Scalar],
+        direction: Mapping[str, Scalar],
     ) -> dict[str, tuple[Scalar, Scalar]]:
-        """Per contact the friction limit at rest and the friction while sliding at `slip` >= 0, both >= 0."""
-        limits = {}
+        """Friction limits of each contact, both >= 0: at rest, and while sliding at `slip` >= 0 in `direction` +-1."""
+        limits = {f"bearings.{name}": (bearing.breakaway, bearing.coulomb) for name, bearing in self.bearings.items()}
         for name, mesh in self.meshes.items():
-            force = ca.fabs(normal[name])
-            path = f"meshes.{name}"
-            limits[path] = (
-                mesh.friction.breakaway(force) * force,
-                mesh.friction.coefficient(slip[path], force) * force,
+            path, force = f"meshes.{name}", ca.fabs(normal[name])
+            sliding = Sliding(
+                speed=slip[path],
+                force=force,
+                a_drives=ca.if_else(direction[path] * normal[name] >= 0, 1, 0),
+                position=motions[name].position,
             )
-        for name, bearing in self.bearings.items():
-            limits[f"bearings.{name}"] = (bearing.breakaway, bearing.coulomb)
+            limits[path] = (mesh.friction.breakaway(sliding) * force, mesh.friction.coefficient(sliding) * force)
         return limits
 
-    def elastic_energy(self, angle: Mapping, flank: Mapping[str, Scalar]) -> Scalar:
+    def elastic_energy(self, motions: Mapping[str, MeshMotion], angle: Mapping, flank: Mapping[str, Scalar]) -> Scalar:
         """Energy [J] stored in teeth and couplings.
 
         The deflection is measured on the pitch circle and the force acts along the line of action, so a
         mesh stores cos(alpha) times the integral of its force law.
         """
         stored = 0.0
-        for name, deflection in self.deflections(angle).items():
-            mesh = self.meshes[name]
-            stored += ca.cos(mesh.pair.pressure_angle) * mesh.elasticity.energy(deflection, flank[name])
+        for name, mesh in self.meshes.items():
+            stored += ca.cos(mesh.pair.pressure_angle) * mesh.law().stored(motions[name], flank[name])
         for coupling in self.couplings.values():
             stored += coupling.stiffness * (angle[coupling.a] - angle[coupling.b]) ** 2 / 2
         return stored

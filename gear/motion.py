@@ -1,0 +1,27 @@
+"""What a mesh tells its laws: where it is, how it moves, how it is loaded."""
+
+from typing import NamedTuple
+
+from gear.quantities import Scalar
+
+
+class MeshMotion(NamedTuple):
+    """Position and motion of a mesh, for the laws of its elasticity."""
+
+    deflection: Scalar  # x_A - x_B [m]
+    rate: Scalar  # its time derivative [m/s]
+    position: Scalar  # x_mesh = (x_A + x_B)/2, the feed through the pitch point [m]
+    speed: Scalar  # its time derivative [m/s]
+    turn_a: Scalar  # angle of wheel A relative to the carrier [rad]
+    turn_b: Scalar  # angle of wheel B relative to the carrier [rad]
+    speed_a: Scalar  # its time derivative [rad/s]
+    speed_b: Scalar  # its time derivative [rad/s]
+
+
+class Sliding(NamedTuple):
+    """State of a sliding mesh, for the laws of its friction; the direction is in the mode, so speed is >= 0."""
+
+    speed: Scalar  # mesh speed [m/s], >= 0
+    force: Scalar  # normal force [N], >= 0
+    a_drives: Scalar  # 1 where wheel A drives, 0 where wheel B does
+    position: Scalar  # x_mesh [m]

@@ -102,15 +102,20 @@ class _Assembly:
             parameters += found
         self.parts, self.ratio = parts, actuator.gear.ratio()
         gear: Transmission = parts["gear"]
+        self.kinematics = actuator.gear.kinematics(gear)
         inertia = {name: shaft.inertia for name, shaft in gear.shafts.items()}
         inertia[gear.input] += getattr(parts["motor"], "inertia", 0)
         inertia[gear.output] += parts["load"].inertia
         self.inertia = inertia
-        self.contacts = ContactMechanics(gear, actuator.gear.redundant(), inertia)
+        self.contacts = ContactMechanics(gear, actuator.gear.redundant(), self.kinematics, inertia)
 
         self.states: list[Quantity] = []
         self.symbols: dict[str, ca.SX] = {}
         self._declare_states()
+        self.angle, self.speed = (
+            self.kinematics.expand({shaft: self.symbols[f"{shaft}.{what}"] for shaft in self.kinematics.independent})
+            for what in ("angle", "speed")
+        )
         self.input_names = self._input_names()
         self.u = {quantity.name: ca.SX.sym(quantity.name) for quantity in self.input_names}
 
@@ -121,11 +126,11 @@ class _Assembly:
         p = ca.vertcat(*(parameter.symbol for parameter in parameters))
         self.outputs: dict[str, tuple[str, ca.SX]] = {}
         rates, torque = self._equations(m)
-        angle, speed = self._motion()
+        angle, speed = self.angle, self.speed
         modes = self.contacts.modes(m)
         forces = self.contacts.forces(angle, speed, torque, modes)
-        for shaft, value in forces.acceleration.items():
-            rates[f"{shaft}.angle"], rates[f"{shaft}.speed"] = speed[shaft], value
+        for shaft in self.kinematics.independent:
+            rates[f"{shaft}.angle"], rates[f"{shaft}.speed"] = speed[shaft], forces.acceleration[shaft]
         self._observe(forces, modes, angle, speed)
 
         arguments = [x, m, u, p]
@@ -151,7 +156,7 @@ class _Assembly:
     # -- names ----------------------------------------------------------------------------------------
 
     def _declare_states(self) -> None:
-        controller, motor, gear = self.parts["controller"], self.parts["motor"], self.parts["gear"]
+        controller, motor = self.parts["controller"], self.parts["motor"]
         axes = getattr(motor, "axes", ())
         if isinstance(controller, PID):
             self._state("controller.integral", "N m", TORQUE)
@@ -163,9 +168,9 @@ class _Assembly:
                 self._state(f"controller.{axis}.integral", "V", VOLTAGE)
         for axis in axes:
             self._state(f"motor.{axis}", "A", CURRENT)
-        for shaft in gear.shafts:
+        for shaft in self.kinematics.independent:
             self._state(f"{shaft}.angle", "rad", ANGLE)
-        for shaft in gear.shafts:
+        for shaft in self.kinematics.independent:
             self._state(f"{shaft}.speed", "rad/s", SPEED)
 
     def _state(self, name: str, unit: str, nominal: float) -> None:
@@ -185,19 +190,12 @@ class _Assembly:
             found.append(Quantity(PREFIX + "voltage", "V"))
         return found
 
-    def _motion(self) -> tuple[dict[str, ca.SX], dict[str, ca.SX]]:
-        shafts = self.parts["gear"].shafts
-        return (
-            {shaft: self.symbols[f"{shaft}.angle"] for shaft in shafts},
-            {shaft: self.symbols[f"{shaft}.speed"] for shaft in shafts},
-        )
-
     # -- equations ------------------------------------------------------------------------------------
 
     def _equations(self, m: ca.SX) -> tuple[dict[str, ca.SX], dict[str, ca.SX]]:
         """Rates of the controller and motor states, and the torques they and the load put on the shafts."""
         gear, load = self.parts["gear"], self.parts["load"]
-        angle, speed = self._motion()
+        angle, speed = self.angle, self.speed
         rates: dict[str, ca.SX] = {}
         drive: Callable = {PID: self._pid, Cascade: self._cascade}.get(type(self.parts["controller"]), self._open)
         motor_torque = drive(rates)
@@ -215,8 +213,8 @@ class _Assembly:
     def _pid(self, rates: dict[str, ca.SX]) -> ca.SX:
         pid, integral = self.parts["controller"], self.symbols["controller.integral"]
         output_shaft = self.parts["gear"].output
-        position = self._point("position", "rad", self.symbols[f"{output_shaft}.angle"])
-        rate = self.symbols[f"{output_shaft}.speed"]
+        position = self._point("position", "rad", self.angle[output_shaft])
+        rate = self.speed[output_shaft]
         if pid.filter_time is not None:
             rate = pid.rate(position, self.symbols["controller.filtered_position"])
             rates["controller.filtered_position"] = rate
@@ -231,9 +229,9 @@ class _Assembly:
     def _cascade(self, rates: dict[str, ca.SX]) -> ca.SX:
         cascade, motor, inverter = self.parts["controller"], self.parts["motor"], self.parts["inverter"]
         gear = self.parts["gear"]
-        motor_speed = self.symbols[f"{gear.input}.speed"]
-        at_load = self.symbols[f"{gear.output}.angle"]
-        at_motor = self.symbols[f"{gear.input}.angle"] / self.ratio
+        motor_speed = self.speed[gear.input]
+        at_load = self.angle[gear.output]
+        at_motor = self.angle[gear.input] / self.ratio
         position = self._point("position", "rad", at_load if cascade.feedback == "load" else at_motor)
         error = self.u["reference"] - position
 
@@ -282,20 +280,21 @@ class _Assembly:
             self._output(f"{side}_angle", "rad", angle[shaft])
             self._output(f"{side}_speed", "rad/s", speed[shaft])
         self._output("motor_angle_at_load", "rad", angle[gear.input] / self.ratio)
+        friction: dict[str, ca.SX] = {}
         for k, contact in enumerate(self.contacts.contacts):
-            name = contact.name.split(".")[1]
-            is_mesh = contact.name.startswith("meshes.")
-            self._output(f"gear.{contact.name}.slip_speed", "m/s" if is_mesh else "rad/s", forces.slip[k])
-            self._output(f"gear.{contact.name}.friction", "N" if is_mesh else "N m", forces.friction[k])
+            unit = ("m/s", "N") if contact.name.startswith("meshes.") else ("rad/s", "N m")
+            self._output(f"gear.{contact.name}.slip_speed", unit[0], forces.slip[k])
+            self._output(f"gear.{contact.name}.friction", unit[1], forces.friction[k])
             work = -forces.friction[k] * sum(arm * speed[shaft] for shaft, arm in contact.torque.items())
             self._output(f"gear.{contact.name}.friction_loss", "W", work)
-            if is_mesh:
-                mesh, normal = gear.meshes[name], forces.normal[name]
-                self._output(f"gear.{contact.name}.normal_force", "N", normal)
-                self._output(f"gear.{contact.name}.deflection", "m", forces.motions[name].deflection)
-                bearing = mesh.bearing_force(normal, forces.friction[k], modes.flank[name])
-                self._output(f"gear.{contact.name}.bearing_force_x", "N", bearing.x)
-                self._output(f"gear.{contact.name}.bearing_force_y", "N", bearing.y)
+            friction[contact.name] = forces.friction[k]
+        for name, normal in forces.normal.items():
+            mesh, path = gear.meshes[name], f"gear.meshes.{name}"
+            self._output(f"{path}.normal_force", "N", normal)
+            self._output(f"{path}.deflection", "m", forces.motions[name].deflection)
+            bearing = mesh.bearing_force(normal, friction.get(f"meshes.{name}", 0.0), modes.flank[name])
+            self._output(f"{path}.bearing_force_x", "N", bearing.x)
+            self._output(f"{path}.bearing_force_y", "N", bearing.y)
         kinetic = sum(self.inertia[shaft] * speed[shaft] ** 2 / 2 for shaft in gear.shafts)
         self._output("mechanical_energy", "J", kinetic + gear.elastic_energy(forces.motions, angle, modes.flank))
 

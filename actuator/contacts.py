@@ -7,6 +7,7 @@ import casadi as ca
 
 from actuator.hybrid import MARGIN_BAND
 from gear.elasticity import DEFLECTION_NOMINAL, has_gap
+from gear.kinematics import Kinematics
 from gear.motion import MeshMotion
 from gear.quantities import Scalar
 from gear.stiction import AT_LIMIT, BACKWARD, FORWARD, Matrix, RestProblem, decide, friction
@@ -46,26 +47,34 @@ class ContactMechanics:
         Symbolic (its numbers are parameters).
     redundant : bool
         Whether several contacts can lock the same shafts.
+    kinematics : Kinematics
+        Which shafts move independently.
     inertia : mapping of str to SX
         Total inertia per shaft.
     """
 
-    def __init__(self, gear: Transmission, redundant: bool, inertia: Mapping[str, Scalar]) -> None:
-        self.gear, self.redundant, self.inertia = gear, redundant, inertia
+    def __init__(
+        self, gear: Transmission, redundant: bool, kinematics: Kinematics, inertia: Mapping[str, Scalar]
+    ) -> None:
+        self.gear, self.redundant, self.kinematics = gear, redundant, kinematics
+        self.inertia = kinematics.solver(inertia)
         self.contacts: list[Contact] = gear.contacts()
-        self.laws = {name: mesh.law() for name, mesh in gear.meshes.items()}
+        # without a gap the flank only matters to friction, where the size of the normal force has a kink
+        laws = {name: mesh.law() for name, mesh in gear.meshes.items() if not mesh.rigid}
+        self.laws = {name: law for name, law in laws.items() if has_gap(law) or gear.meshes[name].friction is not None}
 
     def mode_names(self) -> list[str]:
         """Names of the mode variables: a motion per contact, a flank per mesh."""
         return [f"gear.{contact.name}.motion" for contact in self.contacts] + [
-            f"gear.meshes.{name}.flank" for name in self.gear.meshes
+            f"gear.meshes.{name}.flank" for name in self.laws
         ]
 
     def modes(self, m: ca.SX) -> ContactModes:
         """The mode variables from the vector m; rounding is taken off here, once."""
         whole = [ca.sign(m[k]) * ((ca.fabs(m[k]) > 0.5) + (ca.fabs(m[k]) > 1.5)) for k in range(m.shape[0])]  # noqa: PLR2004
         count = len(self.contacts)
-        return ContactModes(ca.vertcat(*whole[:count]), dict(zip(self.gear.meshes, whole[count:], strict=True)))
+        flanks = dict.fromkeys(self.gear.meshes, ca.SX(1)) | dict(zip(self.laws, whole[count:], strict=True))
+        return ContactModes(ca.vertcat(*whole[:count]), flanks)
 
     def slip_speeds(self, speed: Mapping[str, Scalar]) -> Matrix:
         """Slip speed of each contact."""
@@ -78,7 +87,7 @@ class ContactMechanics:
         motions = self.gear.motions(angle, speed)
         normal = self.gear.normal_forces(motions, modes.flank)
         smooth = self.gear.torques(angle, speed, normal)
-        free = {shaft: (smooth[shaft] + torque.get(shaft, 0)) / self.inertia[shaft] for shaft in self.gear.shafts}
+        free = self.inertia.accelerations({shaft: value + torque.get(shaft, 0) for shaft, value in smooth.items()})
         demand = ca.vertcat(*(sum(c * free[shaft] for shaft, c in contact.slip.items()) for contact in self.contacts))
         compliance = self.compliance()
         static, sliding = self.limits(motions, normal, direction * slip, direction, modes)
@@ -86,26 +95,28 @@ class ContactMechanics:
         given = direction * ca.if_else(at_limit, static, sliding)
         held = ca.eq(direction, 0) * self._engaged(modes)
         scalar = friction(compliance, demand, held, given, self.redundant)
-        acceleration = {
-            shaft: free[shaft]
-            + sum(
-                contact.torque[shaft] * scalar[k] for k, contact in enumerate(self.contacts) if shaft in contact.torque
-            )
-            / self.inertia[shaft]
-            for shaft in self.gear.shafts
-        }
+        answer = self.inertia.accelerations(self.friction_torques(scalar))
+        acceleration = {shaft: free[shaft] + answer[shaft] for shaft in self.gear.shafts}
         return ContactForces(motions, normal, slip, static, sliding, compliance, demand, scalar, acceleration)
 
     def compliance(self) -> Matrix:
         """G of the joint decision: slip acceleration of contact i per unit of friction against it in contact k."""
         count = len(self.contacts)
         matrix = ca.SX(count, count)
-        for i, row in enumerate(self.contacts):
-            for k, column in enumerate(self.contacts):
-                shared = [shaft for shaft in row.slip if shaft in column.torque]
-                if shared:
-                    matrix[i, k] = -sum(row.slip[s] * column.torque[s] / self.inertia[s] for s in shared)
+        for k, column in enumerate(self.contacts):
+            answer = self.inertia.accelerations(column.torque)
+            for i, row in enumerate(self.contacts):
+                taken = ca.SX(sum(c * answer[shaft] for shaft, c in row.slip.items()))
+                if not taken.is_zero():
+                    matrix[i, k] = -taken
         return matrix
+
+    def friction_torques(self, scalar: Matrix) -> dict[str, Scalar]:
+        """Torque on each shaft from the friction scalars."""
+        return {
+            shaft: sum((c.torque[shaft] * scalar[k] for k, c in enumerate(self.contacts) if shaft in c.torque), 0.0)
+            for shaft in self.gear.shafts
+        }
 
     def limits(
         self, motions: Mapping, normal: Mapping, speed: Matrix, direction: Matrix, modes: ContactModes
@@ -158,7 +169,7 @@ class ContactMechanics:
         for name, law in self.laws.items():
             flank = modes.flank[name]
             if not has_gap(law):
-                rows.append(flank * forces.normal[name] / law.nominal_force())
+                rows.append(flank * forces.normal[name] / (law.nominal_force() * self.gear.meshes[name].count))
                 continue
             for side in (1, -1):
                 beyond = law.penetration(forces.motions[name], side) / DEFLECTION_NOMINAL
@@ -235,17 +246,13 @@ class ContactMechanics:
         """
         before = self.modes(m)
         flank = self.flanks_after(fired, angle, speed, before.flank)
-        named = dict(zip(self.gear.meshes, flank, strict=True))
+        named = dict.fromkeys(self.gear.meshes, ca.SX(1)) | dict(zip(self.laws, flank, strict=True))
         problem = self.problem(fired, angle, speed, torque, before.motion, named)
         impulse = friction(
             problem.compliance, self.slip_speeds(speed), problem.rest, ca.SX.zeros(len(self.contacts)), self.redundant
         )
-        speeds = [
-            speed[shaft]
-            + sum(c.torque[shaft] * impulse[k] for k, c in enumerate(self.contacts) if shaft in c.torque)
-            / self.inertia[shaft]
-            for shaft in self.gear.shafts
-        ]
+        step = self.inertia.accelerations(self.friction_torques(impulse))
+        speeds = [speed[shaft] + step[shaft] for shaft in self.kinematics.independent]
         pose = ca.Function(
             f"{name}_pose",
             [fired, *arguments],

@@ -47,10 +47,12 @@ class Mesh:
         Name of the shaft that carries the line of centers; None for the housing.
     pair : ExternalPair or GivenPair
         Radii and averaged friction arms.
-    elasticity : Linear or Backlash
-        Normal force from deflection and its rate.
-    friction : Coulomb
-        Friction coefficients.
+    elasticity : Linear, Backlash, ... or None
+        Normal force from deflection and its rate; None for rigid teeth, a constraint.
+    friction : Coulomb, ... or None
+        Friction coefficients; None for no losses. Rigid teeth have none: their normal force is not a law.
+    count : int
+        Equal meshes side by side that share the load (the planets of a set, lumped into one shaft).
     stick_by : "mesh speed" or "conjugate speed"
         The speed that friction opposes and that is zero while stuck: v as above, or
         u = e_A (phi_A' - phi_G') - e_B (phi_B' - phi_G'), for which friction never does positive work.
@@ -65,8 +67,9 @@ class Mesh:
     b: str
     carrier: str | None = None
     pair: ExternalPair | GivenPair
-    elasticity: Linear | Backlash
-    friction: Coulomb
+    elasticity: Linear | Backlash | None = None
+    friction: Coulomb | None = None
+    count: int = 1
     stick_by: Literal["mesh speed", "conjugate speed"] = "mesh speed"
 
     def __post_init__(self) -> None:
@@ -74,11 +77,24 @@ class Mesh:
             raise ValueError(
                 f"Mesh needs three different shafts, got a={self.a!r}, b={self.b!r}, carrier={self.carrier!r}"
             )
+        if self.friction is not None and self.elasticity is None:
+            raise ValueError(
+                "Mesh.friction needs the normal force of an elasticity; give one, or leave the friction out"
+            )
+        if isinstance(self.count, bool) or not isinstance(self.count, int) or self.count < 1:
+            raise ValueError(f"Mesh.count must be a whole number >= 1, got {self.count!r}")
         if self.stick_by not in ("mesh speed", "conjugate speed"):
             raise ValueError(f'Mesh.stick_by must be "mesh speed" or "conjugate speed", got {self.stick_by!r}')
 
+    @property
+    def rigid(self) -> bool:
+        """Whether the teeth are a constraint and not a spring."""
+        return self.elasticity is None
+
     def law(self) -> ElasticityLaw:
         """The elasticity as a law of the whole mesh; a bare tooth spring acts on both flanks."""
+        if self.elasticity is None:
+            raise ValueError("rigid teeth have no law of elasticity: their normal force is that of a constraint")
         return self.elasticity if isinstance(self.elasticity, ElasticityLaw) else Gapless(law=self.elasticity)
 
     def motion(self, angle: Mapping[str, Scalar], speed: Mapping[str, Scalar]) -> MeshMotion:

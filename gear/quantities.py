@@ -12,6 +12,7 @@ from typing import Annotated, Any, get_type_hints
 from annotated_types import Ge, Gt, Le, Lt, Unit
 
 Scalar = Any  # a float, or a CasADi expression of one: laws are written once for both
+Matrix = Any  # of CasADi: SX inside functions, MX around them; plain numbers become DM
 
 Number = Annotated[float, Unit("-")]
 Coefficient = Annotated[float, Unit("-"), Ge(0)]

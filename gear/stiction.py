@@ -24,11 +24,13 @@ D. E. Stewart, "Rigid-body dynamics with friction and impact", SIAM Review 42 (2
 M. Hintermueller, K. Ito, K. Kunisch, "The primal-dual active set strategy", SIAM J. Optim. 13 (2002).
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import casadi as ca
 
-Matrix = Any  # of CasADi: SX inside the sweeps, MX around them, and plain numbers become DM
+from gear.elimination import factorize, substitute
+from gear.quantities import Matrix
+
 STUCK, FORWARD, BACKWARD, AT_LIMIT = 0, 1, -1, 2  # motion of a contact; AT_LIMIT is +2 or -2
 
 REGULARIZATION = 1e-8  # of G where contacts are redundant; refined away, see `friction`
@@ -52,7 +54,7 @@ def friction(compliance: Matrix, demand: Matrix, held: Matrix, given: Matrix, re
     """
     count = demand.shape[0]
     shift = REGULARIZATION if redundant else 0.0
-    lower, upper = _factorize(
+    lower, upper = factorize(
         [
             [
                 ca.if_else(held[i], compliance[i, j] * (1 + shift if i == j else 1), 1.0 if i == j else 0.0)
@@ -61,35 +63,11 @@ def friction(compliance: Matrix, demand: Matrix, held: Matrix, given: Matrix, re
             for i in range(count)
         ]
     )
-    solution = _substitute(lower, upper, ca.if_else(held, demand, given))
+    solution = ca.vertcat(*substitute(lower, upper, ca.vertsplit(ca.if_else(held, demand, given))))
     for _ in range(REFINEMENTS if redundant else 0):
-        solution += _substitute(lower, upper, held * (demand - compliance @ solution))
+        leftover = held * (demand - compliance @ solution)
+        solution += ca.vertcat(*substitute(lower, upper, ca.vertsplit(leftover)))
     return solution
-
-
-def _factorize(rows: list[list[ca.SX]]) -> tuple[dict, list[list[ca.SX]]]:
-    """LU factors without pivoting: all principal minors of G are positive, and chains of contacts stay banded."""
-    rows, lower = [list(row) for row in rows], {}
-    for pivot in range(len(rows)):
-        for i in range(pivot + 1, len(rows)):
-            if not ca.SX(rows[i][pivot]).is_zero():
-                lower[i, pivot] = rows[i][pivot] / rows[pivot][pivot]
-                for j in range(pivot + 1, len(rows)):
-                    rows[i][j] = rows[i][j] - lower[i, pivot] * rows[pivot][j]
-    return lower, rows
-
-
-def _substitute(lower: dict, upper: list[list[ca.SX]], right: ca.SX) -> ca.SX:
-    solution = [right[i] for i in range(right.shape[0])]
-    for i in range(len(solution)):
-        for j in range(i):
-            if (i, j) in lower:
-                solution[i] = solution[i] - lower[i, j] * solution[j]
-    for i in reversed(range(len(solution))):
-        for j in range(i + 1, len(solution)):
-            solution[i] = solution[i] - upper[i][j] * solution[j]
-        solution[i] = solution[i] / upper[i][i]
-    return ca.vertcat(*solution)
 
 
 class RestProblem(NamedTuple):

@@ -7,13 +7,14 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
+from gear.kinematics import Kinematics, null_space
 from gear.mesh import MESH_SPEED_NOMINAL, Mesh
 from gear.motion import MeshMotion, Sliding
 from gear.quantities import Scalar
 from gear.shafts import Bearing, Coupling, Shaft
 
 BEARING_SPEED_NOMINAL = 1.0  # rad/s
-RANK = 1e-9  # part of the largest singular value that counts as zero
+RANK = 1e-9  # motion of the output below which it stands still
 BEARING_TORQUE_FLOOR = 1e-3  # N m; keeps the scale of a frictionless bearing finite
 
 
@@ -42,6 +43,8 @@ class Transmission:
         By name; they refer to shafts by name.
     input, output : str
         Names of the shafts on which the motor and the load act.
+    fixed : tuple of str
+        Names of shafts that are fixed to the housing, such as a ring gear.
 
     Raises
     ------
@@ -56,14 +59,21 @@ class Transmission:
     couplings: Mapping[str, Coupling] = field(default_factory=dict)
     input: str
     output: str
+    fixed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for what, name in [("input", self.input), ("output", self.output), *self._references()]:
             if name not in self.shafts:
                 raise ValueError(f"Transmission.{what} names shaft {name!r}; the shafts are {', '.join(self.shafts)}")
+        for name in self.fixed:
+            if name not in self.shafts:
+                raise ValueError(f"Transmission.fixed names shaft {name!r}; the shafts are {', '.join(self.shafts)}")
+            if name in (self.input, self.output):
+                raise ValueError(f"Transmission.fixed names shaft {name!r}, which is the input or output")
+        self._require_connected()
+        kinematics = self.kinematics()
         for name, mesh in self.meshes.items():
-            _require_positive_stuck_inertia(name, mesh, {shaft: part.inertia for shaft, part in self.shafts.items()})
-        self.ratio()
+            self._require_positive_stuck_inertia(name, mesh, kinematics)
 
     def _references(self) -> list[tuple[str, str]]:
         found = []
@@ -74,6 +84,39 @@ class Transmission:
                     if shaft is not None:
                         found.append((f"{kind}.{name}.{terminal}", shaft))
         return found
+
+    def _require_connected(self) -> None:
+        """Raise where a shaft has no way to the input through meshes and couplings."""
+        reached, joined = {self.input}, [set(mesh.deflection_per_shaft()) for mesh in self.meshes.values()]
+        joined += [{coupling.a, coupling.b} for coupling in self.couplings.values()]
+        for _ in self.shafts:
+            reached |= set().union(*(group for group in joined if group & reached))
+        alone = [name for name in self.shafts if name not in reached]
+        if alone:
+            raise ValueError(
+                f"Transmission: shaft {alone[0]!r} is not joined to the input {self.input!r}; every shaft needs a mesh "
+                "or a coupling that leads there"
+            )
+
+    def _require_positive_stuck_inertia(self, name: str, mesh: Mesh, kinematics: Kinematics) -> None:
+        if mesh.friction is None or mesh.stick_by == "conjugate speed":
+            return
+        inertia = kinematics.solver({shaft: part.inertia for shaft, part in self.shafts.items()})
+        answer = inertia.accelerations(mesh.torque_per_friction())
+        mobility = -sum(float(slip * answer[shaft]) for shaft, slip in mesh.slip_per_shaft().items())
+        if mobility <= 0:
+            raise ValueError(
+                f'Transmission: mesh {name!r} cannot stick by "mesh speed": its friction would speed up the slip it '
+                f"opposes ({-mobility:.4g} m/s^2 per N with the inertias given); use stick_by='conjugate speed'"
+            )
+
+    def kinematics(self, symbolic: "Transmission | None" = None) -> Kinematics:
+        """Which shafts move independently; with the expressions of `symbolic`, the same set with other numbers."""
+        source = self if symbolic is None else symbolic
+        constraints = [[{name: 1.0} for name in self.fixed] for _ in range(2)]
+        for k, gear in enumerate((source, self)):
+            constraints[k] += [mesh.deflection_per_shaft() for mesh in gear.meshes.values() if mesh.rigid]
+        return Kinematics(list(self.shafts), *constraints, keep=[self.output, self.input])
 
     def contacts(self) -> list[Contact]:
         """Every place that can stick, along the shafts, so that neighbors in the list are neighbors in the train."""
@@ -96,17 +139,23 @@ class Transmission:
                     mesh.slip_per_shaft(),
                     mesh.torque_per_friction(),
                     MESH_SPEED_NOMINAL,
-                    mesh.law().nominal_force(),
+                    mesh.count * mesh.law().nominal_force(),
                 )
                 for name, mesh in self.meshes.items()
-                if mesh.a == shaft
+                if mesh.a == shaft and mesh.friction is not None
             ]
         return found
 
     def redundant(self) -> bool:
         """Whether several contacts can lock the same shafts, so that their friction is not unique."""
-        rows = self._matrix([contact.slip for contact in self.contacts()])
-        return np.linalg.matrix_rank(rows) < len(rows)
+        contacts, kinematics = self.contacts(), self.kinematics()
+        if not contacts:
+            return False
+        turns = np.array(
+            [[float(row.get(q, 0.0)) for q in kinematics.independent] for row in kinematics.turns.values()]
+        )
+        rows = self._matrix([contact.slip for contact in contacts]) @ turns
+        return int(np.linalg.matrix_rank(rows)) < len(rows)
 
     def ratio(self) -> float:
         """Turns of the input shaft per turn of the output shaft, all teeth and couplings rigid.
@@ -120,17 +169,17 @@ class Transmission:
 
     def travel(self) -> dict[str, float]:
         """Turns of every shaft per turn of the output shaft, all teeth and couplings rigid; errors as `ratio`."""
-        rigid = [mesh.deflection_per_shaft() for mesh in self.meshes.values()]
+        rigid = [mesh.deflection_per_shaft() for mesh in self.meshes.values()] + [{name: 1.0} for name in self.fixed]
         rigid += [{coupling.a: 1.0, coupling.b: -1.0} for coupling in self.couplings.values()]
         names = list(self.shafts)
-        motions = _null_space(self._matrix(rigid)) if rigid else np.eye(len(names))
+        motions = null_space(self._matrix(rigid))
         ends = motions[[names.index(self.input), names.index(self.output)]]
-        if np.linalg.matrix_rank(ends, tol=RANK) != 1 or abs(ends[1]).max() < RANK:
+        if motions.shape[1] != 1 or abs(ends[1]).max() < RANK:
             raise ValueError(
-                f"Transmission: shafts {self.input!r} (input) and {self.output!r} (output) are not joined by one speed "
-                "ratio; every shaft between them needs a mesh or a coupling, and a carrier its own connection"
+                f"Transmission: {self.input!r} (input) and {self.output!r} (output) are not joined by one speed ratio: "
+                f"with rigid teeth {motions.shape[1]} speeds are free; fix a shaft, or join what is loose"
             )
-        moving = motions[:, int(abs(ends[1]).argmax())]
+        moving = motions[:, 0]
         return {
             name: float(turns) for name, turns in zip(names, moving / moving[names.index(self.output)], strict=True)
         }
@@ -142,18 +191,21 @@ class Transmission:
 
     def motions(self, angle: Mapping[str, Scalar], speed: Mapping[str, Scalar]) -> dict[str, MeshMotion]:
         """Position and motion of each mesh from the angles [rad] and speeds [rad/s] of the shafts."""
-        return {name: mesh.motion(angle, speed) for name, mesh in self.meshes.items()}
+        return {name: mesh.motion(angle, speed) for name, mesh in self.meshes.items() if not mesh.rigid}
 
     def normal_forces(self, motions: Mapping[str, MeshMotion], flank: Mapping[str, Scalar]) -> dict[str, Scalar]:
-        """Signed normal force [N] of each mesh on its present flank."""
-        return {name: mesh.law().force(motions[name], flank[name]) for name, mesh in self.meshes.items()}
+        """Signed normal force [N] of each elastic mesh on its present flank, the sum of its `count` equal ones."""
+        return {
+            name: self.meshes[name].count * self.meshes[name].law().force(motion, flank[name])
+            for name, motion in motions.items()
+        }
 
     def torques(self, angle: Mapping, speed: Mapping, normal: Mapping[str, Scalar]) -> dict[str, Scalar]:
         """Torque on each shaft [N m] from teeth, couplings and viscous drag, without what can stick."""
         torque = dict.fromkeys(self.shafts, 0.0)
-        for name, mesh in self.meshes.items():
-            for shaft, arm in mesh.torque_per_normal().items():
-                torque[shaft] += arm * normal[name]
+        for name, force in normal.items():
+            for shaft, arm in self.meshes[name].torque_per_normal().items():
+                torque[shaft] += arm * force
         for coupling in self.couplings.values():
             passed = coupling.stiffness * (angle[coupling.a] - angle[coupling.b]) + coupling.damping * (
                 speed[coupling.a] - speed[coupling.b]
@@ -174,10 +226,12 @@ class Transmission:
         """Friction limits of each contact, both >= 0: at rest, and while sliding at `slip` >= 0 in `direction` +-1."""
         limits = {f"bearings.{name}": (bearing.breakaway, bearing.coulomb) for name, bearing in self.bearings.items()}
         for name, mesh in self.meshes.items():
+            if mesh.friction is None:
+                continue
             path, force = f"meshes.{name}", ca.fabs(normal[name])
             sliding = Sliding(
                 speed=slip[path],
-                force=force,
+                force=force / mesh.count,
                 a_drives=ca.if_else(direction[path] * normal[name] >= 0, 1, 0),
                 position=motions[name].position,
             )
@@ -191,27 +245,9 @@ class Transmission:
         mesh stores cos(alpha) times the integral of its force law.
         """
         stored = 0.0
-        for name, mesh in self.meshes.items():
-            stored += ca.cos(mesh.pair.pressure_angle) * mesh.law().stored(motions[name], flank[name])
+        for name, motion in motions.items():
+            mesh = self.meshes[name]
+            stored += ca.cos(mesh.pair.pressure_angle) * mesh.count * mesh.law().stored(motion, flank[name])
         for coupling in self.couplings.values():
             stored += coupling.stiffness * (angle[coupling.a] - angle[coupling.b]) ** 2 / 2
         return stored
-
-
-def _require_positive_stuck_inertia(name: str, mesh: Mesh, inertia: Mapping[str, Scalar]) -> None:
-    if mesh.stick_by == "conjugate speed":
-        return
-    slip, torque = mesh.slip_per_shaft(), mesh.torque_per_friction()
-    mobility = -sum(float(slip[shaft] * torque[shaft]) / inertia[shaft] for shaft in slip)
-    if mobility <= 0:
-        raise ValueError(
-            f'Transmission: mesh {name!r} cannot stick by "mesh speed": its friction would speed up the slip it '
-            f"opposes ({-mobility:.4g} m/s^2 per N with the inertias given); use stick_by='conjugate speed'"
-        )
-
-
-def _null_space(matrix: np.ndarray) -> np.ndarray:
-    """Orthonormal motions that leave every row of `matrix` at zero, one per column."""
-    _, values, rows = np.linalg.svd(matrix)
-    rank = int((values > RANK * values.max()).sum())
-    return rows[rank:].T

@@ -131,7 +131,7 @@ class _Assembly:
         forces = self.contacts.forces(angle, speed, torque, modes)
         for shaft in self.kinematics.independent:
             rates[f"{shaft}.angle"], rates[f"{shaft}.speed"] = speed[shaft], forces.acceleration[shaft]
-        self._observe(forces, modes, angle, speed)
+        self._observe(forces, modes, angle, speed, self.contacts.rigid_forces(forces, angle, speed, torque))
 
         arguments = [x, m, u, p]
         fired = ca.SX.sym("fired", len(self.contacts.margin_names()))
@@ -274,7 +274,7 @@ class _Assembly:
     def _output(self, name: str, unit: str, value: Any) -> None:
         self.outputs[name] = (unit, ca.SX(value))
 
-    def _observe(self, forces: Any, modes: Any, angle: dict, speed: dict) -> None:
+    def _observe(self, forces: Any, modes: Any, angle: dict, speed: dict, rigid: dict) -> None:
         gear: Transmission = self.parts["gear"]
         for side, shaft in (("motor", gear.input), ("load", gear.output)):
             self._output(f"{side}_angle", "rad", angle[shaft])
@@ -288,11 +288,13 @@ class _Assembly:
             work = -forces.friction[k] * sum(arm * speed[shaft] for shaft, arm in contact.torque.items())
             self._output(f"gear.{contact.name}.friction_loss", "W", work)
             friction[contact.name] = forces.friction[k]
-        for name, normal in forces.normal.items():
+        for name, normal in {**forces.normal, **rigid}.items():
             mesh, path = gear.meshes[name], f"gear.meshes.{name}"
             self._output(f"{path}.normal_force", "N", normal)
-            self._output(f"{path}.deflection", "m", forces.motions[name].deflection)
-            bearing = mesh.bearing_force(normal, friction.get(f"meshes.{name}", 0.0), modes.flank[name])
+            if name in forces.motions:
+                self._output(f"{path}.deflection", "m", forces.motions[name].deflection)
+            flank = ca.if_else(normal < 0, -1, 1)
+            bearing = mesh.bearing_force(normal, friction.get(f"meshes.{name}", 0.0), flank)
             self._output(f"{path}.bearing_force_x", "N", bearing.x)
             self._output(f"{path}.bearing_force_y", "N", bearing.y)
         kinetic = sum(self.inertia[shaft] * speed[shaft] ** 2 / 2 for shaft in gear.shafts)

@@ -57,7 +57,7 @@ class ContactMechanics:
         self, gear: Transmission, redundant: bool, kinematics: Kinematics, inertia: Mapping[str, Scalar]
     ) -> None:
         self.gear, self.redundant, self.kinematics = gear, redundant, kinematics
-        self.inertia = kinematics.solver(inertia)
+        self.masses, self.inertia = inertia, kinematics.solver(inertia)
         self.contacts: list[Contact] = gear.contacts()
         # without a gap the flank only matters to friction, where the size of the normal force has a kink
         laws = {name: mesh.law() for name, mesh in gear.meshes.items() if not mesh.rigid}
@@ -110,6 +110,25 @@ class ContactMechanics:
                 if not taken.is_zero():
                     matrix[i, k] = -taken
         return matrix
+
+    def rigid_forces(self, forces: ContactForces, angle: Mapping, speed: Mapping, torque: Mapping) -> dict[str, Scalar]:
+        """Normal force [N] of each rigid mesh: what keeps its constraint, with the modes' friction acting.
+
+        With R the constraints and J the inertias of the shafts, R J^-1 R^T lambda = R J^-1 torque.
+        """
+        rigid = [name for name, mesh in self.gear.meshes.items() if mesh.rigid]
+        rows = [self.gear.meshes[name].deflection_per_shaft() for name in rigid] + [{s: 1.0} for s in self.gear.fixed]
+        if not rigid:
+            return {}
+        smooth, stuck = self.gear.torques(angle, speed, forces.normal), self.friction_torques(forces.friction)
+        free = {s: (smooth[s] + stuck[s] + torque.get(s, 0)) / self.masses[s] for s in self.gear.shafts}
+        compliance, demand = ca.SX(len(rows), len(rows)), ca.SX(len(rows), 1)
+        for i, row in enumerate(rows):
+            demand[i] = sum(c * free[s] for s, c in row.items())
+            for k, other in enumerate(rows):
+                compliance[i, k] = sum(c * other[s] / self.masses[s] for s, c in row.items() if s in other)
+        kept = friction(compliance, demand, ca.SX.ones(len(rows)), ca.SX.zeros(len(rows)), redundant=True)
+        return {name: kept[k] / ca.cos(self.gear.meshes[name].pair.pressure_angle) for k, name in enumerate(rigid)}
 
     def friction_torques(self, scalar: Matrix) -> dict[str, Scalar]:
         """Torque on each shaft from the friction scalars."""

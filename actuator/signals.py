@@ -99,6 +99,10 @@ class Ramp:
     slope: float
     end: float = math.inf
 
+    def __post_init__(self) -> None:
+        if self.end < self.time:
+            raise ValueError(f"Ramp.end must be >= Ramp.time, got end={self.end:g} s and time={self.time:g} s")
+
     def pieces(self) -> list[tuple[float, Piece]]:
         """Constant, line, constant."""
         found = [(-math.inf, Piece(self.start)), (self.time, Piece(self.start, self.slope))]
@@ -117,6 +121,10 @@ class Sine:
     offset: float = 0.0
     phase: float = 0.0
 
+    def __post_init__(self) -> None:
+        if self.frequency <= 0:
+            raise ValueError(f"Sine.frequency must be > 0 Hz, got {self.frequency:g} Hz")
+
     def pieces(self) -> list[tuple[float, Piece]]:
         """Constant, then one wave."""
         wave = Wave(self.amplitude, self.phase, 2 * math.pi * self.frequency)
@@ -133,6 +141,10 @@ class Chirp:
     duration: float
     time: float = 0.0
     offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.duration <= 0:
+            raise ValueError(f"Chirp.duration must be > 0 s, got {self.duration:g} s")
 
     def pieces(self) -> list[tuple[float, Piece]]:
         """Constant, one wave, constant."""
@@ -172,7 +184,7 @@ class Table:
 class Sum:
     """Several signals on one input."""
 
-    parts: tuple["Signal", ...]
+    parts: tuple[Signal, ...]
 
     def pieces(self) -> list[tuple[float, Piece]]:
         """A piece between every two break points of the parts."""

@@ -14,6 +14,12 @@ from studies.report import write_report
 DEFAULT_CASE = "aileron"
 
 
+class WrongCase(click.ClickException):
+    """A case that cannot be run; its one line is all that is shown."""
+
+    exit_code = 2
+
+
 class CaseGroup(click.Group):
     """Commands by name; anything else is taken for the path of a case file."""
 
@@ -66,7 +72,7 @@ def _run(case: str | Path, out: Path) -> None:
     try:
         loaded = load_case(case)
     except CaseError as error:
-        raise click.UsageError(str(error)) from None
+        raise WrongCase(str(error)) from None
     with click.progressbar(length=1000, label=loaded.title, show_eta=False) as bar:
         done = 0
 

@@ -1,6 +1,6 @@
 """One actuator: motor, inverter, controller, gear and load, composed into a HybridSystem."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -12,13 +12,15 @@ from actuator.hybrid import HybridSystem, Quantity
 from actuator.inverter import Inverter
 from actuator.load import Load
 from actuator.motor import PMSM, DCMotor, TorqueSource
-from actuator.parameters import parameterize
+from actuator.parameters import parameterize, with_values
 from controllers.cascade import Cascade
 from controllers.pid import PID, limited
 from gear.transmission import Transmission
 
 # usual sizes, for the error control; an angle is fine when the teeth's deflection is
 ANGLE, SPEED, CURRENT, VOLTAGE, TORQUE = 1e-4, 0.1, 1.0, 1.0, 1.0
+PARTS = ("controller", "inverter", "motor", "gear", "load")
+SAME_RATIO = 1e-9
 PREFIX = "inject."  # inputs that are added to a signal inside a loop
 
 
@@ -97,7 +99,7 @@ class _Assembly:
     def __init__(self, actuator: Actuator) -> None:
         parts: dict[str, Any] = {}
         parameters = []
-        for name in ("controller", "inverter", "motor", "gear", "load"):
+        for name in PARTS:
             parts[name], found = parameterize(getattr(actuator, name), name)
             parameters += found
         self.parts, self.ratio = parts, actuator.gear.ratio()
@@ -148,6 +150,7 @@ class _Assembly:
             flow=ca.Function("flow", arguments, [ca.vertcat(*(rates[state.name] for state in self.states))]),
             margins=ca.Function("margins", arguments, [self.contacts.margins(forces, modes)]),
             reset=self._whole_reset(settle, arguments),
+            check=lambda values: _check_values(actuator, values),
             outputs_function=ca.Function(
                 "outputs", arguments, [ca.vertcat(*(value for _, value in self.outputs.values()))]
             ),
@@ -220,11 +223,12 @@ class _Assembly:
             rates["controller.filtered_position"] = rate
         error = self.u["reference"] - position
         proposed = pid.proposed(integral, error, rate)
-        torque = limited(limited(proposed, pid.limit), self.parts["motor"].torque_limit)
+        at_motor = limited(limited(proposed, pid.limit) / self.ratio, self.parts["motor"].torque_limit)
+        torque = at_motor * self.ratio
         rates["controller.integral"] = pid.integral_derivative(error, proposed, torque)
         # the demand is at the load; an ideal motor in front of a gear turns `ratio` times as fast
         self._output("position_error", "rad", error)
-        return self._point("torque_reference", "N m", torque / self.ratio)
+        return self._point("torque_reference", "N m", at_motor)
 
     def _cascade(self, rates: dict[str, ca.SX]) -> ca.SX:
         cascade, motor, inverter = self.parts["controller"], self.parts["motor"], self.parts["inverter"]
@@ -307,6 +311,17 @@ class _Assembly:
         count = speeds.shape[0]
         x = inputs[1]
         return ca.Function("reset", inputs, [ca.vertcat(x[: x.shape[0] - count], speeds), modes, fault])
+
+
+def _check_values(actuator: Actuator, values: Mapping[str, float]) -> None:
+    """Raise where parameters break a rule, or change what the model was built on."""
+    parts = {name: with_values(getattr(actuator, name), name, values) for name in PARTS}
+    before, after = actuator.gear.ratio(), parts["gear"].ratio()
+    if abs(after - before) > SAME_RATIO * abs(before):
+        raise ValueError(
+            f"{actuator.name}: these parameters change the gear ratio from {before:.6g} to {after:.6g}, on which the "
+            "model is built; make a new Actuator"
+        )
 
 
 def _travel(gear: Transmission) -> dict[str, int]:

@@ -4,6 +4,7 @@ import contextlib
 import hashlib
 import logging
 import os
+import shlex
 import shutil
 import subprocess
 import tempfile
@@ -29,7 +30,7 @@ def cache_folder() -> Path:
 @cache
 def compiler() -> str | None:
     """Path of the C compiler ($CC, else cc or gcc), or None where there is none."""
-    candidates = [os.environ["CC"]] if "CC" in os.environ else ["cc", "gcc", "clang"]
+    candidates = shlex.split(os.environ["CC"])[:1] if "CC" in os.environ else ["cc", "gcc", "clang"]
     return next((path for path in map(shutil.which, candidates) if path), None)
 
 
@@ -46,7 +47,11 @@ def compile_function(function: ca.Function) -> ca.Function | None:
         _say_once("no C compiler found: simulations run interpreted, about ten times slower")
         return None
     folder = cache_folder()
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        _say_once(f"no cache for compiled systems in {folder} ({error.strerror}): simulations run interpreted")
+        return None
     with tempfile.TemporaryDirectory(dir=folder) as work:
         generator = ca.CodeGenerator("system.c", {"with_header": False})
         generator.add(function)

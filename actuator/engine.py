@@ -6,11 +6,14 @@ negative the interval is run again in finer steps until the violation is pinned 
 settled there. Intervals with more events than the log holds are run again in finer steps too.
 """
 
+import contextlib
+import io
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
+import casadi as ca
 import numpy as np
 
 from actuator.compiled import compile_function
@@ -97,6 +100,16 @@ class EngineOptions:
     waves: int = 0
 
 
+def _called(window: ca.Function, arguments: tuple) -> tuple[list[np.ndarray], str]:
+    """Results of a window, or why there are none."""
+    try:
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):  # CasADi's own words
+            raw = [array.full() for array in window(*arguments)]
+    except RuntimeError as error:
+        return [], str(error).strip().splitlines()[-1]
+    return raw, "" if all(np.isfinite(array).all() for array in raw) else "the state is no longer finite"
+
+
 @lru_cache(maxsize=32)
 def engine(system: HybridSystem, options: EngineOptions = EngineOptions()) -> "Engine":
     """The engine of a system, built once per system and options."""
@@ -114,7 +127,7 @@ class Engine:
         if loaded is None and options.compiled:
             raise RuntimeError("EngineOptions.compiled=True needs a C compiler (cc, gcc or $CC); none was found")
         self.compiled = loaded is not None
-        self.window = loaded or function
+        self.interpreted, self.window = function, loaded or function
 
     def settle(
         self, time: float, x: np.ndarray, m: np.ndarray, u: np.ndarray, p: np.ndarray
@@ -140,14 +153,12 @@ class Engine:
         def part(start: float, end: float, x: np.ndarray, m: np.ndarray) -> Window:
             return self.run(start, end - start, x, m, p, [piece.after(start - time) for piece in pieces])
 
-        try:
-            raw = [array.full() for array in self.window(x, m, p, length, self.form.coefficients(pieces))]
-            failure = None if all(np.isfinite(array).all() for array in raw) else "the state is no longer finite"
-        except RuntimeError as error:
-            raw, failure = [], str(error).strip().splitlines()[-1]
+        arguments = x, m, p, length, self.form.coefficients(pieces)
+        raw, failure = _called(self.window, arguments)
         if failure:
             if length / 2 < FINEST_WINDOW:
-                raise self._stopped(time, m, failure)
+                # compiled code fails without a word; the interpreter knows why
+                raise self._stopped(time, m, _called(self.interpreted, arguments)[1] or failure)
             first = part(time, time + length / 2, x, m)
             return join([first, part(time + length / 2, time + length, *first.end)])
 
@@ -191,8 +202,8 @@ class Engine:
         found = []
         for tau, packed in reversed(list(zip(times, codes.reshape(-1, self.code.size), strict=False))):
             modes = self.code.words(packed)
-            if tau < 0:
-                raise self._inconsistent(time, np.array(modes))
+            if tau < 0:  # a fault, with its time below minus one
+                raise self._inconsistent(time + length * (-1 - tau), np.array(modes))
             found.append((time + length * tau, modes))
         return found
 

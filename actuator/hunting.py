@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuator.run import STUCK, Run
+from actuator.run import FREE, STUCK, Run
 
 REST, HUNTING, LIMIT_CYCLE = "rest", "hunting", "limit cycle without sticking"
 DIVERGING, IRREGULAR = "diverging", "irregular"
@@ -12,6 +12,9 @@ DIVERGING, IRREGULAR = "diverging", "irregular"
 STILL = 1e-9  # rad; less motion than this is none
 SAME = 0.02  # relative difference up to which two swings or two periods are the same
 SWING = 0.1  # part of the largest late swing that counts as a turn
+GROWS = 1.25  # from each eighth of the time to the next; the start of a step response grows by less
+SETTLED = 1e-3  # part of all motion that is left in the last eighth of a settling load
+DECAYED = 0.3  # part of the last swing that may be left for ever on the way to rest
 FLAT = 0.01  # part of the least swing within which a plateau is level
 GROWTH = 2.0  # factor over the observed time that is growth, and its inverse decay
 STICKS = 1e-3  # part of a period at standstill from which a cycle is called hunting
@@ -86,9 +89,10 @@ def classify(run: Run, *, since: float | None = None) -> Hunting:
         return Hunting(verdict=REST, reason=f"the load moves less than {STILL:g} rad in the second half")
     turns = turning_points(load, SWING * np.ptp(late))
     swings, moments = np.abs(np.diff(load[turns])), time[turns]
-    pattern = _pattern(swings, np.diff(moments))
+    pattern = _pattern(swings, np.diff(moments), float(np.diff(time).max()))
     if pattern is None:
-        return _without_cycle(swings, load, time[-1] - time[0])
+        away = _moves_away(run, keep)
+        return _without_cycle(swings, load, time[-1] - time[0], _drift(run, keep), away)
     period, window = _period(run, time, load, moments[-1 - pattern], moments[-1])
     stuck = stuck_fraction(run, window[1] - period, window[1])
     cycle = (run.t >= window[1] - period) & (run.t <= window[1])
@@ -126,16 +130,22 @@ def turning_points(signal: np.ndarray, least: float) -> list[int]:
 
 def stuck_fraction(run: Run, start: float, end: float) -> float:
     """Part of the time from start to end in which every contact is stuck, from the times of the mode changes."""
-    first = int(np.searchsorted(run.t, start))
-    modes = {name: row[min(first, len(row) - 1)] for name, row in run.modes.items()}
+    modes = {name: str(row[0]) for name, row in run.modes.items()}
+    modes |= {change.contact: change.before for change in reversed(run.changes)}
+    # a contact that never sticks (no friction, or in its gap) does not tell whether the others stand
+    modes = {name: mode for name, mode in modes.items() if (run.modes[name] == STUCK).any()}
     if not modes:
         return 0.0
-    inside = [change for change in run.changes if run.t[min(first, len(run.t) - 1)] < change.time <= end]
     stuck, at = 0.0, float(start)
-    for change in inside:
-        stuck += (change.time - at) * all(mode == STUCK for mode in modes.values())
-        modes[change.contact], at = change.after, change.time
-    stuck += (end - at) * all(mode == STUCK for mode in modes.values())
+    for change in run.changes:
+        if change.time > end:
+            break
+        if change.time > at:
+            stuck += (change.time - at) * all(mode in (STUCK, FREE) for mode in modes.values())
+            at = change.time
+        if change.contact in modes:
+            modes[change.contact] = change.after
+    stuck += (end - at) * all(mode in (STUCK, FREE) for mode in modes.values())
     return float(stuck / (end - start))
 
 
@@ -150,15 +160,18 @@ def _inputs_settled(run: Run) -> float:
     return last
 
 
-def _pattern(swings: np.ndarray, times: np.ndarray) -> int | None:
-    """Smallest even number of swings after which sizes and times repeat, twice over; None where they do not."""
+def _pattern(swings: np.ndarray, times: np.ndarray, step: float) -> int | None:
+    """Smallest even number of swings after which sizes and times repeat, twice over; None where they do not.
+
+    Times are known to `step`, the distance of the output points.
+    """
     for count in range(2, LONGEST_PATTERN + 1, 2):
         if len(swings) < 2 * count + 1:
             return None
         pairs = [(row[-count:], row[-2 * count : -count]) for row in (swings, times)]
         whole = times[-count:].sum()
         sizes_repeat = np.allclose(*pairs[0], rtol=SAME, atol=SAME * swings[-count:].max())
-        times_repeat = np.allclose(*pairs[1], rtol=SAME, atol=SAME * whole)
+        times_repeat = np.allclose(*pairs[1], rtol=SAME, atol=SAME * whole + 2 * step)
         if sizes_repeat and times_repeat:
             return count
     return None
@@ -183,36 +196,44 @@ def _drift(run: Run, keep: np.ndarray) -> str:
     """The controller state that still moves behind a standing load, in words; empty where none does."""
     for quantity in run.system.states:
         if quantity.name.startswith("controller."):
-            before, after = _quarters(run[quantity.name][keep])
+            before, after = _pieces(run[quantity.name][keep], 4)[2:]
             if after > max(STILL * quantity.nominal, before / GROWTH):
                 return f"{quantity.name} still moves, by {after:.3g} {quantity.unit} in the last quarter"
     return ""
 
 
-def _quarters(signal: np.ndarray) -> tuple[float, float]:
-    """Peak to peak in the third and in the last quarter."""
-    n = len(signal)
-    return float(np.ptp(signal[n // 2 : 3 * n // 4])), float(np.ptp(signal[3 * n // 4 :]))
+def _moves_away(run: Run, keep: np.ndarray) -> bool:
+    """Whether the load is farther from its reference in the last quarter than in the first; true without one."""
+    if "reference" not in run.signals:
+        return True
+    error = np.abs(run["reference"] - run["load_angle"])[keep]
+    quarter = max(len(error) // 4, 1)
+    return bool(error[-quarter:].max() > error[:quarter].max())
 
 
-def _without_cycle(swings: np.ndarray, load: np.ndarray, observed: float) -> Hunting:
-    before, after = _quarters(load)
-    if len(swings) < FEWEST and after < before / GROWTH:
-        return Hunting(verdict=REST, reason=f"the load settles without turning, by {after:.3g} rad in the last quarter")
-    if len(swings) < FEWEST:
+def _pieces(signal: np.ndarray, count: int) -> list[float]:
+    """Peak to peak in each of `count` equal pieces."""
+    return [float(np.ptp(piece)) for piece in np.array_split(signal, count)]
+
+
+def _without_cycle(swings: np.ndarray, load: np.ndarray, observed: float, drifts: str, away: bool) -> Hunting:
+    *_, e5, e6, e7, e8 = _pieces(load, 8)
+    if min(e6 / max(e5, STILL), e7 / max(e6, STILL), e8 / max(e7, STILL)) > GROWS and e5 > STILL and away:
+        factor = e8 / e5
         return Hunting(
-            verdict=IRREGULAR, reason=f"the load turns only {len(swings) + 1} times in {observed:g} s; simulate longer"
+            verdict=DIVERGING, reason=f"the motion of the load grows, by a factor {factor:.3g} in {observed / 2:.3g} s"
+        )
+    if e8 < SETTLED * np.ptp(load) and e8 < e7 / GROWTH and not drifts:
+        return Hunting(verdict=REST, reason=f"the load settles, to within {e8:.3g} rad in the last eighth")
+    if len(swings) < FEWEST:
+        why = f"but {drifts}" if drifts else "and does not settle"
+        return Hunting(
+            verdict=IRREGULAR,
+            reason=f"the load turns only {len(swings) + 1} times in {observed:g} s {why}; simulate longer",
         )
     ratios = swings[1:] / swings[:-1]
-    total = swings[-1] / swings[-FEWEST]
-    if (ratios[-FEWEST:] > 1 + SAME).all() and swings[-1] / swings[0] > GROWTH:
-        return Hunting(
-            verdict=DIVERGING,
-            reason=f"the swings of the load grow, by a factor {swings[-1] / swings[0]:.3g} in {observed:g} s",
-        )
-    # a transient into a cycle shrinks too, but by less and less: look one swing ahead
-    ahead = max(ratios[-1], 2 * ratios[-1] - ratios[-2])
-    if (ratios[1 - FEWEST :] < 1 - 2 * SAME).all() and ahead < 1 - 2 * SAME:
+    if (ratios[1 - FEWEST :] < 1 - 2 * SAME).all() and _limit(swings) < DECAYED * swings[-1]:
+        total = swings[-1] / swings[-FEWEST]
         return Hunting(
             verdict=REST,
             reason=f"each swing of the load is smaller than the one before, the last {FEWEST} by {total:.3g}",
@@ -221,3 +242,9 @@ def _without_cycle(swings: np.ndarray, load: np.ndarray, observed: float) -> Hun
         verdict=IRREGULAR,
         reason=f"{len(swings)} swings of the load in {observed:g} s neither repeat nor settle; simulate longer",
     )
+
+
+def _limit(swings: np.ndarray) -> float:
+    """Where shrinking swings are going, by Aitken's rule on every other one; a transient into a cycle shrinks, too."""
+    early, late = swings[-3] - swings[-5], swings[-1] - swings[-3]
+    return float(abs(swings[-1] - late**2 / (late - early))) if late != early else float("inf")

@@ -11,7 +11,7 @@ Event rules, stated once:
 4. The system does not depend on time; inputs do.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -52,6 +52,8 @@ class HybridSystem:
         In the order of p, with defaults.
     travel : mapping of str to int
         Per contact +1 or -1: the direction in which it slides when the output moves forward.
+    check : callable or None
+        Raises ValueError where changed parameters, by name, break a rule.
     flow, margins, reset, outputs_function : casadi.Function
         As above; `fired` is a vector with 1 at the margin that fired.
     """
@@ -68,6 +70,7 @@ class HybridSystem:
     margins: ca.Function
     reset: ca.Function
     outputs_function: ca.Function
+    check: Callable[[Mapping[str, float]], None] | None = None
 
     def __post_init__(self) -> None:
         names = [quantity.name for quantity in (*self.states, *self.inputs, *self.outputs)]
@@ -78,9 +81,11 @@ class HybridSystem:
             )
 
     def parameter_values(self, changes: Mapping[str, float] | None = None) -> np.ndarray:
-        """Values of p: the defaults, with `changes` by name."""
+        """Values of p: the defaults, with `changes` by name, held against the rules of their components."""
         changes = changes or {}
         require_known(changes, [parameter.name for parameter in self.parameters], "parameter")
+        if changes and self.check is not None:
+            self.check(changes)
         return np.array([float(changes.get(parameter.name, parameter.default)) for parameter in self.parameters])
 
     def state_vector(self, values: Mapping[str, float] | None = None) -> np.ndarray:

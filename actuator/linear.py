@@ -13,11 +13,13 @@ from scipy.optimize import brentq
 from actuator.actuator import PREFIX
 from actuator.hybrid import HybridSystem
 from actuator.parameters import require_known
-from actuator.trim import NoEquilibrium, OperatingPoint
+from actuator.trim import NoEquilibrium, OperatingPoint, rounding
 
 RESIDUAL = 1e-5  # rate of a state over its nominal size [1/s]
+CUT, SLOW = 1e-6, 1e-2  # a loop whose gain is below CUT above SLOW rad/s is cut
+UNSTABLE = 1e-9  # part of the fastest pole that a pole may lie to the right of zero by rounding
 NOTHING = 1e-9  # loop gain of a loop that is not there: a stuck gear passes nothing on, but for rounding
-GRID = np.logspace(-2, 6, 4001)  # rad/s, on which crossings are bracketed
+GRID = np.logspace(-6, 6, 6001)  # rad/s, on which crossings are bracketed
 
 
 def linearize(
@@ -52,10 +54,12 @@ def linearize(
     state_names = [quantity.name for quantity in system.states]
     output_names = [quantity.name for quantity in system.outputs]
     require_known(outputs, [*output_names, *state_names], "output")
+    require_known(drifting, state_names, "state")
+    floor = rounding(system, point.x, point.m, point.u, point.p)
     moving = {
         quantity.name: rate
-        for quantity, rate in zip(system.states, point.rates, strict=True)
-        if abs(rate) > RESIDUAL * quantity.nominal and quantity.name not in drifting
+        for quantity, rate, least in zip(system.states, point.rates, floor, strict=True)
+        if abs(rate) > max(RESIDUAL, least) * quantity.nominal and quantity.name not in drifting
     }
     if moving:
         text = ", ".join(f"d({name})/dt = {rate:.4g}" for name, rate in moving.items())
@@ -71,7 +75,10 @@ def linearize(
         d[np.ix_(rows, columns)],
         states=[_signal(name) for name in state_names],
         inputs=[_signal(name) for name in inputs],
-        outputs=[_signal(name) for name in outputs],
+        # a state may have the name of an output but for the dot
+        outputs=[
+            _signal(name) + "_state" * (_signal(name) != name and _signal(name) in output_names) for name in outputs
+        ],
     )
 
 
@@ -131,17 +138,20 @@ class Margins:
 
     Attributes
     ----------
+    stable : bool
+        Whether the closed loop is; where it is not, the delay margin is zero.
     gain : float
         Factor on the loop gain to instability [-], the nearest to one; above one unless the loop is
         conditionally stable.
     phase_rad, delay_s : float
-        Smallest phase lag and smallest delay to instability.
+        Phase lag and smallest delay to instability; the phase is negative where the closed loop is unstable.
     gain_frequency, phase_frequency, delay_frequency : float
         Where they are [rad/s].
     peak_sensitivity, sensitivity_frequency : float
         Largest |1/(1 + L)| [-] and where [rad/s].
     """
 
+    stable: bool
     gain: float
     gain_frequency: float
     phase_rad: float
@@ -173,23 +183,43 @@ def margins(loop: control.StateSpace, frequencies: np.ndarray = GRID) -> Margins
         return complex(loop(1j * frequency))
 
     values = np.asarray(loop(1j * frequencies))
+    if np.abs(values[frequencies > SLOW]).max() < CUT:
+        # a stuck gear passes nothing on; the double integrators of what is locked hold nothing but rounding
+        return Margins(
+            stable=True,
+            gain=math.inf,
+            gain_frequency=math.nan,
+            phase_rad=math.inf,
+            phase_frequency=math.nan,
+            delay_s=math.inf,
+            delay_frequency=math.nan,
+            peak_sensitivity=1.0,
+            sensitivity_frequency=math.nan,
+        )
     gain_crossings = _roots(lambda w: abs(response(w)) - 1, frequencies, abs(values) - 1)
     # on the negative real axis the imaginary part changes sign, away from it the branch at 0 deg does too
     phase_crossings = [
         w for w in _roots(lambda w: response(w).imag, frequencies, np.imag(values)) if response(w).real < -NOTHING
     ]
     gains = [(-1 / response(w).real, w) for w in phase_crossings]
+    standing = complex(loop(0.0, warn_infinite=False))  # infinite with an integrator
+    if math.isfinite(abs(standing)) and standing.real < -NOTHING:
+        gains.append((-1 / standing.real, 0.0))
     phases = [((math.pi + np.angle(response(w))) % (2 * math.pi), w) for w in gain_crossings]
-    signed = [(min(phase, 2 * math.pi - phase), w) for phase, w in phases]
-    delays = [(phase / w, w) for phase, w in phases]
+    signed = [(phase - 2 * math.pi if phase > math.pi else phase, w) for phase, w in phases]
+    a, b, c, d = (np.asarray(part) for part in (loop.A, loop.B, loop.C, loop.D))
+    poles = np.linalg.eigvals(a - b @ c / (1 + d.item()))
+    stable = bool((poles.real <= UNSTABLE * np.abs(poles).max(initial=1.0)).all())
+    delays = [(phase / w, w) for phase, w in phases] if stable else [(0.0, math.nan)]
     peak = int((1 / abs(1 + values)).argmax())
     nothing = (math.inf, math.nan)
     gain, phase, delay = (
         min(gains, key=lambda pair: abs(math.log(pair[0])), default=nothing),
-        min(signed, default=nothing),
+        min(signed, key=lambda pair: abs(pair[0]), default=nothing),
         min(delays, default=nothing),
     )
     return Margins(
+        stable=stable,
         gain=gain[0],
         gain_frequency=gain[1],
         phase_rad=phase[0],
@@ -202,6 +232,13 @@ def margins(loop: control.StateSpace, frequencies: np.ndarray = GRID) -> Margins
 
 
 def _roots(function: Callable[[float], float], grid: np.ndarray, values: np.ndarray) -> list[float]:
-    brackets = np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0)
-    found = (brentq(function, grid[k], grid[k + 1], xtol=1e-12 * grid[k], full_output=True)[1] for k in brackets)
-    return [float(result.root) for result in found]
+    above = values >= 0
+    return [_root(function, float(grid[k]), float(grid[k + 1])) for k in np.flatnonzero(above[:-1] != above[1:])]
+
+
+def _root(function: Callable[[float], float], low: float, high: float) -> float:
+    """The root between two frequencies; one of them, where rounding has it there."""
+    ends = function(low), function(high)
+    if ends[0] * ends[1] >= 0:
+        return low if abs(ends[0]) < abs(ends[1]) else high
+    return float(brentq(function, low, high, xtol=1e-12 * low, full_output=True)[1].root)

@@ -2,7 +2,7 @@
 
 import difflib
 from collections.abc import Iterable, Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from typing import Any, NamedTuple, TypeVar
 
 import casadi as ca
@@ -49,10 +49,32 @@ def _copy(part: Any, path: str, found: list[Parameter]) -> Any:
     return copy
 
 
+def with_values(part: Any, path: str, values: Mapping[str, float]) -> Any:
+    """The same component with other numbers, each by its name, checked as when it was made.
+
+    Raises
+    ------
+    ValueError
+        Where a number breaks a rule of its component.
+    """
+    if isinstance(part, Mapping):
+        return {name: with_values(item, f"{path}.{name}", values) for name, item in part.items()}
+    if not is_dataclass(part) or isinstance(part, type):
+        return part
+    changes = {}
+    for field in fields(part):
+        old, name = getattr(part, field.name), f"{path}.{field.name}"
+        new = float(values[name]) if name in values else with_values(old, name, values)
+        if new is not old and new != old:
+            changes[field.name] = new
+    return replace(part, **changes) if changes else part
+
+
 def require_known(names: Iterable[str], valid: Iterable[str], what: str) -> None:
     """Raise KeyError for the first name that is not among the valid ones, with the nearest of them."""
     valid = list(valid)
     for name in names:
         if name not in valid:
             near = difflib.get_close_matches(name, valid, n=3, cutoff=0.4) or valid[:8]
-            raise KeyError(f"no {what} named {name!r}; did you mean {' or '.join(near)}?")
+            hint = f"did you mean {' or '.join(near)}?" if near else "there are none"
+            raise KeyError(f"no {what} named {name!r}; {hint}")

@@ -11,6 +11,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MultipleLocator
 
 from actuator.linear import margins
+from actuator.parameters import require_known
 from actuator.run import BACKWARD, FORWARD, FREE, STUCK, Run
 
 MODE_COLORS = {STUCK: "#4d4d4d", FORWARD: "#3b75af", BACKWARD: "#e1812c", FREE: "#d9d9d9"}
@@ -32,6 +33,7 @@ def plot_run(run: Run, names: Sequence[str], *, span: tuple[float, float] | None
     Angles are drawn in degrees. `span` is the time window [s]; None for all.
     """
     by_unit: dict[str, list[str]] = {}
+    require_known(names, run.signals, "signal")
     for name in names:
         by_unit.setdefault(run.units[name], []).append(name)
     ratios = [1.6] * len(by_unit) + [RIBBON_HEIGHT * len(run.modes) + 0.15]

@@ -1,6 +1,7 @@
 """Simulate one actuator over time."""
 
 import math
+import numbers
 import time as clock
 from collections.abc import Callable, Mapping
 
@@ -105,8 +106,13 @@ def simulate(  # noqa: PLR0913 - a simulation has this many choices, all but two
 
 def _signals(system: HybridSystem, inputs: Mapping[str, Signal | float]) -> list[Signal]:
     require_known(inputs, [quantity.name for quantity in system.inputs], "input")
-    given = {
-        name: Constant(value=float(value)) if isinstance(value, int | float) else value
-        for name, value in inputs.items()
-    }
+    given = {name: _signal(name, value) for name, value in inputs.items()}
     return [given.get(quantity.name, Constant(value=0.0)) for quantity in system.inputs]
+
+
+def _signal(name: str, value: Signal | float) -> Signal:
+    if not isinstance(value, numbers.Real):
+        return value  # pyright: ignore[reportReturnType] - a number of any library is a Real
+    if not math.isfinite(value):
+        raise ValueError(f"input {name!r} must be a signal or a finite number, got {value!r}")
+    return Constant(value=float(value))

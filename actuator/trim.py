@@ -1,5 +1,6 @@
 """Operating points: states at which nothing changes, in a chosen contact mode."""
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -15,6 +16,7 @@ from actuator.run import contact_labels, contact_names
 MOTIONS = {"stuck": 0, "forward": 1, "backward": -1}
 STEPS = 60  # Newton steps; the equations of a mode are nearly linear
 STILL = 1e-9  # rate of a state over its nominal size [1/s] that counts as zero
+ROUNDING, MOST_ROUNDING = 100 * np.finfo(float).eps, 1e-2
 HOLDS = -1e-6  # a margin below this does not hold
 
 
@@ -51,6 +53,12 @@ class OperatingPoint:
     def states(self) -> dict[str, float]:
         """States by name."""
         return {quantity.name: float(value) for quantity, value in zip(self.system.states, self.x, strict=True)}
+
+    @property
+    def flanks(self) -> dict[str, int]:
+        """Flank of each mesh that has one, by contact."""
+        named = zip(self.system.modes, self.m, strict=True)
+        return {name.removesuffix(".flank"): int(mode) for name, mode in named if name.endswith(".flank")}
 
     @property
     def outputs(self) -> dict[str, float]:
@@ -124,25 +132,32 @@ def trim(  # noqa: PLR0913 - what may be held and where to start are all choices
     system = plant.system() if isinstance(plant, Actuator) else plant
     names = [quantity.name for quantity in system.states]
     require_known(drifting, names, "state")
+    flanks: dict[str, int] = {}
     if guess is None and contacts == "stuck":
-        guess = trim(system, "forward", inputs=inputs, parameters=parameters, drifting=drifting).states
+        with contextlib.suppress(NoEquilibrium):  # without one, the search starts from zero
+            before = trim(system, "forward", inputs=inputs, parameters=parameters, drifting=drifting)
+            guess, flanks = before.states, before.flanks
     u, p, x = system.input_vector(inputs), system.parameter_values(parameters), system.state_vector(guess)
     scale = np.array([quantity.nominal for quantity in system.states])
     free = np.array([name not in drifting for name in names])
     flank_names = [name.removesuffix(".flank") for name in system.modes if name.endswith(".flank")]
-    flanks = dict.fromkeys(flank_names, 1)
+    flanks = dict.fromkeys(flank_names, 1) | flanks
     for _ in range(2 + len(flanks)):
         m = modes_of(system, contacts, flanks)
         x, rates = _newton(system, x, m, u, p, scale, free)
         forces = dict(
             zip([q.name for q in system.outputs], system.outputs_function(x, m, u, p).full().ravel(), strict=True)
         )
-        found = {name: -1 if forces[f"{name}.normal_force"] < 0 else 1 for name in flanks}
+        found = {name: -1 if flanks[name] * forces[f"{name}.normal_force"] < 0 else 1 for name in flanks}
+        found = {name: flanks[name] * keeps for name, keeps in found.items()}
         if found == flanks:
             break
         flanks = found
     margins = system.margins(x, m, u, p).full().ravel()
-    if margins.size and margins.min() < HOLDS and not _held_by_others(system, x, m, u, p):
+    if margins.size and margins.min() < HOLDS:
+        m, held = _held_by_others(system, x, m, u, p)
+        margins = np.zeros(1) if held else margins
+    if margins.size and margins.min() < HOLDS:
         raise NoEquilibrium(
             f"{system.name}: {system.margin_names[int(margins.argmin())]} does not hold at this operating point "
             f"(margin {margins.min():.3g} of its usual size); choose a mode in which it slides, or another load",
@@ -151,10 +166,14 @@ def trim(  # noqa: PLR0913 - what may be held and where to start are all choices
     return OperatingPoint(system=system, x=x, m=m, u=u, p=p, rates=rates)
 
 
-def _held_by_others(system: HybridSystem, x: np.ndarray, m: np.ndarray, u: np.ndarray, p: np.ndarray) -> bool:
-    """Whether the joint decision leaves every contact stuck: where several lock one shaft, others may take over."""
-    after = system.reset(np.zeros(len(system.margin_names)), x, m, u, p)[1].full().ravel()
-    return contact_labels(system.modes, m) == contact_labels(system.modes, np.round(after))
+def _held_by_others(
+    system: HybridSystem, x: np.ndarray, m: np.ndarray, u: np.ndarray, p: np.ndarray
+) -> tuple[np.ndarray, bool]:
+    """Modes with contacts at their limit, where others that lock the same shaft take over, and whether all hold."""
+    _, modes, fault = system.reset(np.zeros(len(system.margin_names)), x, m, u, p)
+    after = np.round(modes.full().ravel())
+    same = contact_labels(system.modes, m) == contact_labels(system.modes, after)
+    return (after, True) if same and not float(fault) else (m, False)
 
 
 def _newton(
@@ -175,7 +194,7 @@ def _newton(
 
     rate = residual(x)
     for _ in range(STEPS):
-        if abs(rate).max() < STILL:
+        if (abs(rate) < STILL).all():
             break
         matrix = jacobian(x, m, u, p).full() / scale[:, None] * scale[None, :]
         rows = 1 / np.maximum(np.linalg.norm(matrix, axis=1), 1e-12)  # stiff rows would drown the others
@@ -188,8 +207,7 @@ def _newton(
         x, rate = x + damping * scale * step, trial
     rates = system.flow(x, m, u, p).full().ravel()
     worst = np.argsort(-abs(rate))[:3]
-    tolerance = STILL + 1e-12 * np.linalg.norm(jacobian(x, m, u, p).full() / scale[:, None] * scale, axis=1).max()
-    if not abs(rate).max() < max(tolerance, 1e-6):
+    if (abs(rate) > rounding(system, x, m, u, p)).any():
         named = dict(zip([quantity.name for quantity in system.states], rates, strict=True))
         text = ", ".join(f"d({system.states[i].name})/dt = {rates[i]:.4g} {system.states[i].unit}/s" for i in worst)
         raise NoEquilibrium(
@@ -198,6 +216,13 @@ def _newton(
             named,
         )
     return x, rates
+
+
+def rounding(system: HybridSystem, x: np.ndarray, m: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Rates of the states over their nominal sizes [1/s] that are rounding: stiff teeth make much of little."""
+    scale = np.array([quantity.nominal for quantity in system.states])
+    matrix = np.abs(_jacobian(system)(x, m, u, p).full())
+    return STILL + np.minimum(ROUNDING * (matrix @ np.abs(x)) / scale, MOST_ROUNDING)
 
 
 @lru_cache(maxsize=32)

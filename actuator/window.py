@@ -114,7 +114,7 @@ def window_function(system: HybridSystem, form: InputForm, code: ModeCode, toler
     """(x, m, p, length, coefficients) -> states, modes, count, times, codes, outputs, margins.
 
     All results have a column per output point, the first for the start. `count` is the number of events so
-    far, `times` those of the last LOG_SLOTS events as parts of the window, newest first (negative where no
+    far, `times` those of the last LOG_SLOTS events as parts of the window, newest first (-1 minus the time where no
     consistent modes were found), `codes` the modes after them.
     """
     nominal = ca.DM([state.nominal for state in system.states])
@@ -181,7 +181,7 @@ def _transition(system: HybridSystem, form: InputForm, code: ModeCode, size: int
     m = ca.Function("unpack", [c], [code.unpack(c)])(codes)
     fired = ca.vertcat(*(ca.fabs(index - k) < 0.5 for k in range(len(system.margin_names))))  # noqa: PLR2004
     after, modes, fault = system.reset(fired, states * nominal, m, u, p)
-    newest = ca.if_else(fault, -1.0, tau)
+    newest = ca.if_else(fault, -1 - tau, tau)
     kept = ca.vertcat(codes, older)[: older.shape[0]]
     post = ca.vertcat(after / nominal, code.pack(modes), count + 1, newest, times[: LOG_SLOTS - 1], kept)
     return ca.Function(

@@ -1,14 +1,21 @@
-"""Friction coefficients of a gear mesh as functions of mesh speed and normal force."""
+"""What a mesh asks of its friction, and the laws that answer."""
 
-from dataclasses import dataclass
 from typing import Protocol
 
+from gear.coulomb import Coulomb
 from gear.motion import Sliding
-from gear.quantities import Coefficient, Scalar, check
+from gear.periodic_friction import PeriodicFriction, UniformFriction
+from gear.quantities import Scalar
+
+__all__ = ["Coulomb", "FrictionLaw", "FrictionLaws"]
 
 
 class FrictionLaw(Protocol):
-    """What a mesh asks of its friction law; the direction of motion is the mesh's business, not the law's."""
+    """What a mesh asks of its friction law; the direction of motion is the mesh's business, not the law's.
+
+    A law is one expression for floats and symbols, finite and with finite slopes also at zero speed and force.
+    The sliding coefficient just off standstill is not above the breakaway coefficient.
+    """
 
     def coefficient(self, sliding: Sliding) -> Scalar:
         """Sliding coefficient [-]."""
@@ -19,38 +26,5 @@ class FrictionLaw(Protocol):
         ...
 
 
-@dataclass(frozen=True, kw_only=True)
-class Coulomb:
-    """Constant sliding friction with its own breakaway value.
-
-        mu(v) = sliding for v > 0,    mu(0) = static
-
-    Parameters
-    ----------
-    sliding, static : float
-        Coefficients while sliding and at breakaway [-], sliding <= static. The other order has no
-        consistent solution at breakaway (a contact that lets go would be held harder than before).
-
-    References
-    ----------
-    F. L. J. van der Linden, "Modeling of geared positioning systems", eq. (34).
-    """
-
-    sliding: Coefficient
-    static: Coefficient
-
-    def __post_init__(self) -> None:
-        check(self)
-        if self.static < self.sliding:
-            raise ValueError(
-                f"Coulomb needs sliding <= static, got sliding={self.sliding:g} and static={self.static:g}; "
-                "a breakaway coefficient below the sliding one has no consistent motion at standstill"
-            )
-
-    def coefficient(self, sliding: Sliding) -> Scalar:
-        """Sliding coefficient [-], the same everywhere."""
-        return self.sliding
-
-    def breakaway(self, sliding: Sliding) -> Scalar:
-        """Coefficient [-] that holds the mesh at rest."""
-        return self.static
+# every law by its type, for files: its members are told apart by their names
+FrictionLaws = UniformFriction | PeriodicFriction

@@ -1,33 +1,35 @@
-"""Involute gear pairs: from teeth to the averaged constants of their friction."""
+"""Gear pairs as a mesh sees them, and external involute pairs from their teeth. Rings: see `gear.internal`."""
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from functools import cached_property
+from typing import Protocol
 
-import casadi as ca
-
-from gear.quantities import Arm, Factor, Length, Number, PressureAngle, Scalar, check
+from gear.involute import Gearing, Path, Rack, Teeth, gearing
+from gear.quantities import Arm, Factor, HelixAngle, Length, Number, PressureAngle, Scalar, check
+from gear.tooth_checks import require_possible, require_teeth
 
 
 class Pair(Protocol):
     """What a mesh asks of a gear pair, however the numbers were obtained.
 
-    Pitch radii [m], working pressure angle [rad], and the averaged constants of the friction: the lever
-    arms `friction_arm_a`, `friction_arm_b` [m] on the wheels and the `friction_factor` [-] on the bearings.
+    Working pitch radii [m] (a ring gear B has a negative one), working pressure angle [rad], and the averaged
+    constants of the friction: the lever arms `friction_arm_a`, `friction_arm_b` [m] on the wheels and the
+    `friction_factor` [-] on the bearings.
     """
 
     @property
     def radius_a(self) -> Scalar:
-        """Pitch radius [m] of wheel A."""
+        """Working pitch radius [m] of wheel A."""
         ...
 
     @property
     def radius_b(self) -> Scalar:
-        """Pitch radius [m] of wheel B."""
+        """Working pitch radius [m] of wheel B, negative for a ring."""
         ...
 
     @property
-    def pressure_angle(self) -> Scalar:
+    def working_angle(self) -> Scalar:
         """Working transverse pressure angle [rad]."""
         ...
 
@@ -47,121 +49,111 @@ class Pair(Protocol):
         ...
 
 
-class Path(NamedTuple):
-    """The path of contact, as distances [m] along the line of action from base tangent point T1 of wheel A."""
-
-    length: float  # T1 to T2
-    pitch: float  # T1 to the pitch point P
-    start: float  # T1 to A, where the tip circle of B crosses
-    end: float  # T1 to B, where the tip circle of A crosses
-
-
 @dataclass(frozen=True, kw_only=True)
 class ExternalPair:
-    """External involute spur pair on its standard center distance.
+    """External involute pair, spur or helical, with or without profile shift, at its distance without backlash.
 
-    The friction of a tooth pair changes sign at the pitch point. Averaged over the path of contact it is
-    one force scalar s acting along three constants (gear_a on the left, T1 its base tangent point):
+        inv(alpha_w) = inv(alpha_t) + 2 tan(alpha_n) (shift_a + shift_b) / (teeth_a + teeth_b)
+        r            = m_t z/2 * cos(alpha_t) / cos(alpha_w)              working pitch radius
+        tip radius   = m_t z/2 + m (addendum + shift - excess)            excess = shift_a + shift_b - (a - a_0) / m
 
-        d_F    = (2 T1P - T1A - T1B) / (T1B - T1A)                  friction_factor
-        d_tauA = (2 T1P^2 - T1A^2 - T1B^2) / (2 (T1B - T1A))        friction_arm_a = -d_tauA
-        d_tauB = (2 T2P^2 - T2A^2 - T2B^2) / (2 (T2B - T2A))        friction_arm_b =  d_tauB
+    m, alpha_n are those of the rack, in the section normal to the teeth; m_t = m / cos(beta) and alpha_t =
+    atan(tan(alpha_n) / cos(beta)) in the plane of the wheels; a is the center distance and a_0 that without
+    shifts. The excess (zero where the shifts cancel) keeps the clearance between tip and root.
+
+    Friction is averaged over the path of contact, see `gear.involute.Path`.
 
     Parameters
     ----------
     teeth_a, teeth_b : int
         Numbers of teeth.
     module : float
-        Module [m]; pitch diameter = module * teeth.
+        Normal module m [m]; for spur teeth without shift, pitch diameter = module * teeth.
     pressure_angle : float
-        Working transverse pressure angle [rad].
+        Normal pressure angle alpha_n of the rack [rad]; the working one of spur teeth without shift.
+    helix_angle : float
+        beta, at the reference cylinders [rad]; 0 for spur teeth. Its hand does not matter.
+    shift_a, shift_b : float
+        Profile shifts, in modules [-]; positive makes teeth thicker and tips higher.
     addendum_a, addendum_b : float
-        Tip radius minus pitch radius, in modules [-].
+        Height of the teeth beyond the reference circle, without the shift, in modules [-].
+    tip_radius_a, tip_radius_b : float or None
+        Where a wheel was turned down or measured [m]; the addendum is then that of the rack only.
 
     Raises
     ------
     ValueError
-        Where the teeth cannot mesh: interference at a base circle, or a contact ratio below one.
+        Where the teeth cannot be cut or cannot mesh, see `gear.tooth_checks.require_possible`.
 
     References
     ----------
-    F. L. J. van der Linden, "Modeling of geared positioning systems", eqs. (21), (27), (30).
+    F. L. J. van der Linden, "Modeling of geared positioning systems", eqs. (21), (27), (30); ISO 21771 for the teeth.
     """
 
     teeth_a: int
     teeth_b: int
     module: Length
     pressure_angle: PressureAngle = math.radians(20.0)
+    helix_angle: HelixAngle = 0.0
+    shift_a: Number = 0.0
+    shift_b: Number = 0.0
     addendum_a: Factor = 1.0
     addendum_b: Factor = 1.0
+    tip_radius_a: Length | None = None
+    tip_radius_b: Length | None = None
 
     def __post_init__(self) -> None:
         check(self)
-        for name in ("teeth_a", "teeth_b"):
-            count = getattr(self, name)
-            if isinstance(count, bool) or not isinstance(count, int) or count < 1:
-                raise ValueError(f"ExternalPair.{name} must be a whole number of teeth >= 1, got {count!r}")
-        path = self.path()
-        for wheel, other, distance in (("a", "b", path.start), ("b", "a", path.length - path.end)):
-            if distance < 0:
-                raise ValueError(
-                    f"ExternalPair: the tip of wheel {other} reaches {-1e3 * distance:.4g} mm below the base tangent "
-                    f"point of wheel {wheel} (interference); needs more teeth on wheel {wheel}, a larger pressure "
-                    f"angle or a smaller addendum_{other}"
-                )
-        if self.contact_ratio() < 1:
-            raise ValueError(
-                f"ExternalPair needs a contact ratio >= 1 to hand over from tooth to tooth, got "
-                f"{self.contact_ratio():.4g}; enlarge addendum_a or addendum_b"
-            )
+        require_teeth(self)
+        require_possible(type(self).__name__, *self._parts())
+
+    def _parts(self) -> tuple[Rack, Teeth, Teeth]:
+        rack = Rack(self.module, self.pressure_angle, self.helix_angle)
+        a = Teeth(self.teeth_a, self.shift_a, self.addendum_a, self.tip_radius_a)
+        return rack, a, Teeth(self.teeth_b, self.shift_b, self.addendum_b, self.tip_radius_b)
+
+    @cached_property
+    def gearing(self) -> Gearing:
+        """Everything that follows from the teeth: radii, angles, center distance, contact and overlap ratio."""
+        return gearing(*self._parts())
 
     @property
     def radius_a(self) -> Scalar:
-        """Pitch radius [m] of wheel A."""
-        return self.module * self.teeth_a / 2
+        """Working pitch radius [m] of wheel A."""
+        return self.gearing.radius_a
 
     @property
     def radius_b(self) -> Scalar:
-        """Pitch radius [m] of wheel B."""
-        return self.module * self.teeth_b / 2
+        """Working pitch radius [m] of wheel B."""
+        return self.gearing.radius_b
 
-    def path(self) -> Path:
-        """Path of contact from the tip circle of B to the tip circle of A."""
-        base_a = self.radius_a * ca.cos(self.pressure_angle)
-        base_b = self.radius_b * ca.cos(self.pressure_angle)
-        tip_a = self.radius_a + self.addendum_a * self.module
-        tip_b = self.radius_b + self.addendum_b * self.module
-        length = (self.radius_a + self.radius_b) * ca.sin(self.pressure_angle)
-        return Path(
-            length=length,
-            pitch=self.radius_a * ca.sin(self.pressure_angle),
-            start=length - ca.sqrt(tip_b**2 - base_b**2),
-            end=ca.sqrt(tip_a**2 - base_a**2),
-        )
+    @property
+    def working_angle(self) -> Scalar:
+        """Working transverse pressure angle [rad]."""
+        return self.gearing.angle
 
     @property
     def friction_factor(self) -> Scalar:
         """Averaged friction force on the bearings per unit of friction scalar, d_F [-]."""
-        path = self.path()
-        return (2 * path.pitch - path.start - path.end) / (path.end - path.start)
+        return self.path().friction_factor
 
     @property
     def friction_arm_a(self) -> Scalar:
         """Averaged lever arm of the friction on wheel A, -d_tauA [m]."""
-        path = self.path()
-        return -(2 * path.pitch**2 - path.start**2 - path.end**2) / (2 * (path.end - path.start))
+        return self.path().friction_arm_a
 
     @property
     def friction_arm_b(self) -> Scalar:
         """Averaged lever arm of the friction on wheel B, d_tauB [m]."""
-        path = self.path()
-        pitch, start, end = (path.length - distance for distance in path[1:])
-        return (2 * pitch**2 - start**2 - end**2) / (2 * (end - start))
+        return self.path().friction_arm_b
 
-    def contact_ratio(self) -> float:
-        """Average number of tooth pairs in contact [-]."""
-        path = self.path()
-        return (path.end - path.start) / (math.pi * self.module * ca.cos(self.pressure_angle))
+    def path(self) -> Path:
+        """Path of contact from the tip circle of B to the tip circle of A."""
+        return self.gearing.path()
+
+    def contact_ratio(self) -> Scalar:
+        """Average number of tooth pairs in contact in one plane [-]."""
+        return self.gearing.contact_ratio()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -176,7 +168,7 @@ class GivenPair:
     radius_a, radius_b : float
         Pitch radii [m].
     pressure_angle : float
-        Working transverse pressure angle [rad].
+        Working pressure angle [rad].
     friction_factor : float
         d_F [-].
     friction_arm_a, friction_arm_b : float
@@ -192,3 +184,8 @@ class GivenPair:
 
     def __post_init__(self) -> None:
         check(self)
+
+    @property
+    def working_angle(self) -> Scalar:
+        """The given pressure angle [rad]."""
+        return self.pressure_angle

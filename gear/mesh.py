@@ -6,9 +6,10 @@ from typing import Literal, NamedTuple
 
 import casadi as ca
 
-from gear.elasticity import Backlash, ElasticityLaw, Gapless, Linear
-from gear.friction import Coulomb
+from gear.elasticity import ElasticityLaw, ElasticityLaws, as_law
+from gear.friction import FrictionLaws
 from gear.geometry import ExternalPair, GivenPair
+from gear.internal import InternalPair
 from gear.motion import MeshMotion
 from gear.quantities import Scalar
 
@@ -16,7 +17,10 @@ MESH_SPEED_NOMINAL = 1e-2  # m/s
 
 
 class BearingForce(NamedTuple):
-    """Planar force [N] of a mesh on wheel B; on wheel A it is the opposite. x runs from A to B."""
+    """Planar force [N] of a mesh on wheel B; on wheel A it is the opposite. x runs from A to the pitch point.
+
+    That is toward the center of an external wheel B. The center of a ring lies the other way.
+    """
 
     x: float  # along the line of centers
     y: float  # perpendicular to it, positive to the left of x
@@ -45,9 +49,9 @@ class Mesh:
         Names of the shafts of wheel A and wheel B.
     carrier : str or None
         Name of the shaft that carries the line of centers; None for the housing.
-    pair : ExternalPair or GivenPair
+    pair : ExternalPair, InternalPair or GivenPair
         Radii and averaged friction arms.
-    elasticity : Linear, Backlash, ... or None
+    elasticity : Linear, Backlash, TransmissionError, ... or None
         Normal force from deflection and its rate; None for rigid teeth, a constraint.
     friction : Coulomb, ... or None
         Friction coefficients; None for no losses. Rigid teeth have none: their normal force is not a law.
@@ -66,9 +70,9 @@ class Mesh:
     a: str
     b: str
     carrier: str | None = None
-    pair: ExternalPair | GivenPair
-    elasticity: Linear | Backlash | None = None
-    friction: Coulomb | None = None
+    pair: ExternalPair | InternalPair | GivenPair
+    elasticity: ElasticityLaws | None = None
+    friction: FrictionLaws | None = None
     count: int = 1
     stick_by: Literal["mesh speed", "conjugate speed"] = "mesh speed"
 
@@ -95,7 +99,7 @@ class Mesh:
         """The elasticity as a law of the whole mesh; a bare tooth spring acts on both flanks."""
         if self.elasticity is None:
             raise ValueError("rigid teeth have no law of elasticity: their normal force is that of a constraint")
-        return self.elasticity if isinstance(self.elasticity, ElasticityLaw) else Gapless(law=self.elasticity)
+        return as_law(self.elasticity)
 
     def motion(self, angle: Mapping[str, Scalar], speed: Mapping[str, Scalar]) -> MeshMotion:
         """Position and motion of the mesh from the angles [rad] and speeds [rad/s] of the shafts."""
@@ -130,7 +134,7 @@ class Mesh:
 
     def torque_per_normal(self) -> dict[str, Scalar]:
         """Torque [N m] on each shaft per normal force [N]: the base radii, T_A = -F_n l_A, T_B = -F_n l_B."""
-        cosine = ca.cos(self.pair.pressure_angle)
+        cosine = ca.cos(self.pair.working_angle)
         return self._per_shaft(-self.pair.radius_a * cosine, -self.pair.radius_b * cosine)
 
     def torque_per_friction(self) -> dict[str, Scalar]:
@@ -142,9 +146,10 @@ class Mesh:
 
             F_B = |F_n| (sin alpha, flank cos alpha) + s d_F (flank cos alpha, -sin alpha)
 
-        Whichever flank is loaded, the axes are pushed apart.
+        Whichever flank is loaded, it pushes B away from A at the pitch point: the axes of external wheels apart,
+        those of a ring and the wheel inside it together.
         """
-        sine, cosine = ca.sin(self.pair.pressure_angle), ca.cos(self.pair.pressure_angle)
+        sine, cosine = ca.sin(self.pair.working_angle), ca.cos(self.pair.working_angle)
         tangential = friction * self.pair.friction_factor
         return BearingForce(
             x=flank * normal * sine + flank * tangential * cosine,

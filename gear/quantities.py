@@ -27,6 +27,21 @@ Damping = Annotated[float, Unit("N s/m"), Ge(0)]
 FrictionTorque = Annotated[float, Unit("N m"), Ge(0)]
 TorsionalStiffness = Annotated[float, Unit("N m/rad"), Gt(0)]
 TorsionalDamping = Annotated[float, Unit("N m s/rad"), Ge(0)]
+PositiveCoefficient = Annotated[float, Unit("-"), Gt(0)]
+ViscousCoefficient = Annotated[float, Unit("s/m"), Ge(0)]
+Share = Annotated[float, Unit("-"), Gt(0), Le(1)]
+AtLeastOne = Annotated[float, Unit("-"), Ge(1)]
+MeshSpeed = Annotated[float, Unit("m/s"), Ge(0)]
+PositiveMeshSpeed = Annotated[float, Unit("m/s"), Gt(0)]
+HelixAngle = Annotated[float, Unit("rad"), Ge(0), Lt(math.pi / 2)]
+Temperature = Annotated[float, Unit("K"), Gt(0)]
+KinematicViscosity = Annotated[float, Unit("m^2/s"), Gt(0)]
+DynamicViscosity = Annotated[float, Unit("Pa s"), Gt(0)]
+Density = Annotated[float, Unit("kg/m^3"), Gt(0)]
+Expansion = Annotated[float, Unit("1/K"), Ge(0)]
+Angle = Annotated[float, Unit("rad")]
+Force = Annotated[float, Unit("N"), Gt(0)]
+Part = Annotated[float, Unit("-"), Gt(0), Lt(1)]
 
 RULES = {
     Gt: ("gt", ">", operator.gt),
@@ -82,3 +97,16 @@ def check(owner: Any) -> None:
                 bound = getattr(note, attribute)
                 if not holds(value, bound):
                     raise ValueError(f"{where} must be {sign} {show(bound, unit)}, got {show(value, unit)}")
+
+
+def check_count(owner: Any, name: str, least: int = 1) -> None:
+    """Hold a field that counts something against its least value.
+
+    Raises
+    ------
+    ValueError
+        Naming the class, the field and the value.
+    """
+    value = getattr(owner, name)
+    if isinstance(value, bool) or not isinstance(value, int) or value < least:
+        raise ValueError(f"{type(owner).__name__}.{name} must be a whole number >= {least}, got {value!r}")

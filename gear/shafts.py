@@ -1,8 +1,10 @@
 """Shafts and what stands beside the meshes: bearings with stiction, flexible couplings."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
-from gear.quantities import FrictionTorque, Inertia, TorsionalDamping, TorsionalStiffness, check, show
+from gear.quantities import Distance, FrictionTorque, Inertia, Scalar, TorsionalDamping, TorsionalStiffness, check, show
+from gear.tables import piecewise_linear
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,8 +27,10 @@ class Shaft:
 class Bearing:
     """Friction between a shaft and the housing: bearing and seal, with stiction.
 
-        torque opposing motion = coulomb + viscous * |speed|      while turning
-                              <= breakaway                        at rest
+        torque opposing motion = coulomb + load_arm * load + viscous * |speed|      while turning
+                              <= breakaway + load_arm * load                        at rest
+
+    The load is the sum of the normal forces of the meshes on the shaft.
 
     Parameters
     ----------
@@ -36,12 +40,15 @@ class Bearing:
         Torque while turning slowly, and the largest that holds the shaft at rest [N m]; coulomb <= breakaway.
     viscous : float
         Torque per speed [N m s/rad].
+    load_arm : float
+        Friction torque per load [m]: friction coefficient times radius of the bearing.
     """
 
     shaft: str
     coulomb: FrictionTorque
     breakaway: FrictionTorque
     viscous: TorsionalDamping = 0.0
+    load_arm: Distance = 0.0
 
     def __post_init__(self) -> None:
         check(self)
@@ -78,3 +85,41 @@ class Coupling:
         check(self)
         if self.a == self.b:
             raise ValueError(f"Coupling needs two different shafts, got {self.a!r} twice")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drag:
+    """Torque that opposes motion and vanishes at rest, as a table over speed: windage, churning.
+
+        torque = -sign(speed) * table(|speed|), straight lines between the points, constant beyond the last
+
+    Parameters
+    ----------
+    shaft : str
+        Name of the shaft.
+    speeds : tuple of float
+        [rad/s], increasing from 0.
+    torques : tuple of float
+        [N m], as many, the first 0, none negative.
+    """
+
+    shaft: str
+    speeds: tuple[float, ...]
+    torques: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        where = f"Drag on shaft {self.shaft!r}"
+        if len(self.speeds) != len(self.torques) or len(self.speeds) < 2:  # noqa: PLR2004
+            raise ValueError(
+                f"{where} needs at least two speeds and as many torques, got {len(self.speeds)} and {len(self.torques)}"
+            )
+        if self.speeds[0] != 0 or any(late <= early for early, late in pairwise(self.speeds)):
+            raise ValueError(f"{where}: speeds must increase from 0 rad/s, got {self.speeds}")
+        if self.torques[0] != 0 or min(self.torques) < 0:
+            raise ValueError(f"{where}: torques must begin with 0 N m and not be negative, got {self.torques}")
+
+    def torque(self, speed: Scalar) -> Scalar:
+        """Torque on the shaft [N m] at a signed speed [rad/s]; an odd function, so no sign is taken."""
+        mirrored = (*(-value for value in reversed(self.speeds[1:])), *self.speeds)
+        odd = (*(-value for value in reversed(self.torques[1:])), *self.torques)
+        return -piecewise_linear(speed, mirrored, odd)

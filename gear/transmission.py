@@ -11,7 +11,7 @@ from gear.kinematics import Kinematics, null_space
 from gear.mesh import MESH_SPEED_NOMINAL, Mesh
 from gear.motion import MeshMotion, Sliding
 from gear.quantities import Scalar
-from gear.shafts import Bearing, Coupling, Shaft
+from gear.shafts import Bearing, Coupling, Drag, Shaft
 
 BEARING_SPEED_NOMINAL = 1.0  # rad/s
 RANK = 1e-9  # motion of the output below which it stands still
@@ -39,7 +39,7 @@ class Transmission:
     ----------
     shafts : mapping of str to Shaft
         By name; the order is the order of the states.
-    meshes, couplings, bearings : mapping of str to Mesh, Coupling, Bearing
+    meshes, couplings, bearings, drags : mapping of str to Mesh, Coupling, Bearing, Drag
         By name; they refer to shafts by name.
     input, output : str
         Names of the shafts on which the motor and the load act.
@@ -57,6 +57,7 @@ class Transmission:
     meshes: Mapping[str, Mesh] = field(default_factory=dict)
     bearings: Mapping[str, Bearing] = field(default_factory=dict)
     couplings: Mapping[str, Coupling] = field(default_factory=dict)
+    drags: Mapping[str, Drag] = field(default_factory=dict)
     input: str
     output: str
     fixed: tuple[str, ...] = ()
@@ -70,6 +71,13 @@ class Transmission:
                 raise ValueError(f"Transmission.fixed names shaft {name!r}; the shafts are {', '.join(self.shafts)}")
             if name in (self.input, self.output):
                 raise ValueError(f"Transmission.fixed names shaft {name!r}, which is the input or output")
+        for name, bearing in self.bearings.items():
+            rigid = [key for key, mesh in self.meshes.items() if mesh.rigid and bearing.shaft in (mesh.a, mesh.b)]
+            if bearing.load_arm > 0 and rigid:
+                raise ValueError(
+                    f"Transmission: bearing {name!r} takes its load from mesh {rigid[0]!r}, which is rigid; give "
+                    "the mesh an elasticity, or load_arm = 0"
+                )
         self._require_connected()
         kinematics = self.kinematics()
         for name, mesh in self.meshes.items():
@@ -77,7 +85,7 @@ class Transmission:
 
     def _references(self) -> list[tuple[str, str]]:
         found = []
-        for kind in ("meshes", "couplings", "bearings"):
+        for kind in ("meshes", "couplings", "bearings", "drags"):
             for name, part in getattr(self, kind).items():
                 for terminal in ("a", "b", "carrier", "shaft"):
                     shaft = getattr(part, terminal, None)
@@ -177,11 +185,13 @@ class Transmission:
         if motions.shape[1] != 1 or abs(ends[1]).max() < RANK:
             raise ValueError(
                 f"Transmission: {self.input!r} (input) and {self.output!r} (output) are not joined by one speed ratio: "
-                f"with rigid teeth {motions.shape[1]} speeds are free; fix a shaft, or join what is loose"
+                f"with rigid teeth {motions.shape[1]} speeds are free; "
+                + ("fix a shaft, or join what is loose" if motions.shape[1] else "the constraints lock the train")
             )
         moving = motions[:, 0]
         return {
-            name: float(turns) for name, turns in zip(names, moving / moving[names.index(self.output)], strict=True)
+            name: float(turns) + 0.0
+            for name, turns in zip(names, moving / moving[names.index(self.output)], strict=True)
         }
 
     def _matrix(self, rows: list[dict[str, Scalar]]) -> np.ndarray:
@@ -214,6 +224,8 @@ class Transmission:
             torque[coupling.b] += passed
         for bearing in self.bearings.values():
             torque[bearing.shaft] -= bearing.viscous * speed[bearing.shaft]
+        for drag in self.drags.values():
+            torque[drag.shaft] += drag.torque(speed[drag.shaft])
         return torque
 
     def friction_limits(
@@ -224,7 +236,10 @@ class Transmission:
         direction: Mapping[str, Scalar],
     ) -> dict[str, tuple[Scalar, Scalar]]:
         """Friction limits of each contact, both >= 0: at rest, and while sliding at `slip` >= 0 in `direction` +-1."""
-        limits = {f"bearings.{name}": (bearing.breakaway, bearing.coulomb) for name, bearing in self.bearings.items()}
+        limits = {}
+        for name, bearing in self.bearings.items():
+            extra = bearing.load_arm * self.bearing_load(bearing, normal)
+            limits[f"bearings.{name}"] = (bearing.breakaway + extra, bearing.coulomb + extra)
         for name, mesh in self.meshes.items():
             if mesh.friction is None:
                 continue
@@ -237,6 +252,13 @@ class Transmission:
             )
             limits[path] = (mesh.friction.breakaway(sliding) * force, mesh.friction.coefficient(sliding) * force)
         return limits
+
+    def bearing_load(self, bearing: Bearing, normal: Mapping[str, Scalar]) -> Scalar:
+        """Sum of the sizes of the normal forces [N] on the wheels of the bearing's shaft."""
+        return sum(
+            (ca.fabs(f) for name, f in normal.items() if bearing.shaft in (self.meshes[name].a, self.meshes[name].b)),
+            0.0,
+        )
 
     def elastic_energy(self, motions: Mapping[str, MeshMotion], angle: Mapping, flank: Mapping[str, Scalar]) -> Scalar:
         """Energy [J] stored in teeth and couplings.

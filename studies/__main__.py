@@ -5,11 +5,13 @@ from pathlib import Path
 
 import click
 
+from actuator import SimulationError
 from studies.benchmark import benchmark as run_benchmark
 from studies.cases import built_in, load_case
 from studies.files import CaseError
+from studies.gear_paper import gear_paper as run_gear_paper
 from studies.judge import judge
-from studies.report import write_report
+from studies.report import write_files, write_report
 
 DEFAULT_CASE = "aileron"
 
@@ -68,6 +70,18 @@ def benchmark(runs: int) -> None:
     run_benchmark(runs, click.echo)
 
 
+@main.command("gear-paper")
+@click.option("--out", type=click.Path(file_okay=False, path_type=Path), default=None, help="Folder for the results.")
+@click.pass_context
+def gear_paper(context: click.Context, out: Path | None) -> None:
+    """Reproduce the gear paper's figures 7, 9, 12 and 13 and its cold gearbox."""
+    with click.progressbar(length=100, label="The gear paper", show_eta=False) as bar:
+        found = run_gear_paper(lambda share: bar.update(int(100 * share) - bar.pos))
+    write_files(found.pictures, found.result, found.text, out or context.obj)
+    for sentence in found.text:
+        click.echo(sentence)
+
+
 def _run(case: str | Path, out: Path) -> None:
     try:
         loaded = load_case(case)
@@ -81,8 +95,14 @@ def _run(case: str | Path, out: Path) -> None:
             bar.update(int(1000 * share) - done)
             done = int(1000 * share)
 
-        judgment = judge(loaded, advance)
-    written = write_report(judgment, out)
+        try:
+            judgment = judge(loaded, advance)
+        except SimulationError as error:
+            raise WrongCase(f"{loaded.name}: {error}") from None
+    try:
+        written = write_report(judgment, out)
+    except OSError as error:
+        raise WrongCase(f"cannot write to {out}: {error.strerror}; choose another folder with --out") from None
     hunting = judgment.hunting
     click.echo(f"verdict: {hunting.verdict} ({hunting.reason})")
     if hunting.cycles:

@@ -7,7 +7,13 @@ from actuator import Actuator, Run, simulate
 from actuator.compiled import compiler
 from actuator.signals import Signal
 from studies.cases import built_in, load_case
-from studies.paper import figure_9, figure_9_inputs, figure_9_start
+from studies.paper import (
+    compound_planetary,
+    compound_planetary_inputs,
+    figure_9,
+    figure_9_inputs,
+    figure_9_start,
+)
 
 RESOLUTION = 2e-3  # s, of the built-in cases
 HEADER = f"{'case':<34}{'engine':<13}{'simulated':>10}{'wall':>11}{'events':>8}{'real time':>12}"
@@ -23,6 +29,7 @@ def benchmark(runs: int, say: Callable[[str], None]) -> None:
     for arms in ("printed", "geometric"):
         plant = figure_9(arms)
         jobs.append((f"figure 9, {arms} lever arms", plant, 10.0, figure_9_inputs(), figure_9_start(plant), 0.05))
+    jobs.append(("compound planetary", compound_planetary(), 10.0, compound_planetary_inputs(), {}, RESOLUTION))
     for name in built_in():
         case = load_case(name)
         jobs.append((name, case.actuator, case.duration, case.inputs, {}, RESOLUTION))

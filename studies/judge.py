@@ -86,9 +86,9 @@ def _model(case: Case, mode: str, inputs: dict[str, float]) -> LinearModel:
     signals = [quantity.name.removeprefix(PREFIX) for quantity in system.inputs if quantity.name.startswith(PREFIX)]
     try:
         point = trim(system, mode, inputs=inputs)
+        loops = {name: loop_transfer(point, name) for name in signals}
     except NoEquilibrium as nothing:
         return LinearModel(mode=mode, reason=str(nothing))
-    loops = {name: loop_transfer(point, name) for name in signals}
     return LinearModel(
         mode=mode, point=point, loops=loops, margins={name: margins(loop) for name, loop in loops.items()}
     )

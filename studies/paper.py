@@ -1,4 +1,4 @@
-"""The gear paper's cases: figure 9, the preloaded gear that sticks and slips.
+"""Cases for the benchmarks: figure 9 of the gear paper, the preloaded gear that sticks and slips, and a compound set.
 
 F. L. J. van der Linden, "Modeling of geared positioning systems: an object oriented gear contact model with
 validation", Tables 3 and 4. The paper gives neither load spring nor damper; 1000 N m/rad and 2 N m s/rad
@@ -8,11 +8,13 @@ both are here by name.
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Literal
 
-from actuator import Actuator, Load, Ramp, TorqueSource
+from actuator import Actuator, Constant, Load, Ramp, Sine, TorqueSource
 from actuator.signals import Signal
-from gear import Coulomb, ExternalPair, GivenPair, Linear, Mesh, Shaft, Transmission
+from gear import Bearing, Coulomb, ExternalPair, GivenPair, InternalPair, Linear, Mesh, Shaft, Transmission
+from gear.arrangements import MeshLaws, Planets, stepped_planetary
 
 PRELOAD = 5.0  # N m on wheel A
 RAMP = 1.0  # N m/s
@@ -63,3 +65,27 @@ def figure_9_start(plant: Actuator) -> Mapping[str, float]:
         "wheel_a.angle": (force / stiffness - pair.radius_b * angle_b) / pair.radius_a,
         "wheel_b.angle": angle_b,
     }
+
+
+def compound_planetary() -> Actuator:
+    """A stepped planetary set, 1:9, with every mesh and two bearings able to stick, against a spring."""
+    laws = MeshLaws(elasticity=Linear(stiffness=1e8, damping=2e4), friction=Coulomb(sliding=0.1, static=0.15))
+    gear = stepped_planetary(
+        sun_planet=ExternalPair(teeth_a=20, teeth_b=40, module=1e-3),
+        step_ring=InternalPair(teeth_a=20, teeth_b=80, module=1e-3, addendum_b=0.7),
+        planets=Planets(count=3, inertia=2e-6, mass=0.02),
+        inertias={"sun": 1e-5, "carrier": 1e-5, "ring": 1e-5},
+        laws=laws,
+    )
+    bearings = {name: Bearing(shaft=name, coulomb=0.005, breakaway=0.01) for name in ("sun", "carrier")}
+    return Actuator(
+        name="compound planetary",
+        motor=TorqueSource(),
+        gear=replace(gear, bearings=bearings),
+        load=Load(inertia=1e-3, damping=0.05, stiffness=2.0),
+    )
+
+
+def compound_planetary_inputs() -> Mapping[str, Signal]:
+    """Back and forth under a constant load."""
+    return {"torque_reference": Sine(amplitude=0.5, frequency=1.0), "load_torque": Constant(value=0.5)}

@@ -39,10 +39,26 @@ def write_report(judgment: Judgment, folder: Path) -> list[Path]:
         result = result_of(judgment)
         (work / "result.json").write_text(json.dumps(result, indent=2, allow_nan=False) + "\n")
         (work / "report.html").write_text(_html(judgment, result, pictures), encoding="utf-8")
-        written = []
-        for path in sorted(work.iterdir()):
-            os.replace(path, folder / path.name)
-            written.append(folder / path.name)
+        return _moved(work, folder)
+
+
+def write_files(pictures: dict[str, Figure], result: dict[str, Any], text: list[str], folder: Path) -> list[Path]:
+    """Write pictures, result.json and findings.txt into `folder`; all of them or, on a failure, none."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder, prefix=".writing-") as hidden:
+        work = Path(hidden)
+        for name, figure in pictures.items():
+            figure.savefig(work / f"{name}.png", dpi=DPI)
+        (work / "result.json").write_text(json.dumps(_finite(result), indent=2, allow_nan=False) + "\n")
+        (work / "findings.txt").write_text("\n\n".join(text) + "\n", encoding="utf-8")
+        return _moved(work, folder)
+
+
+def _moved(work: Path, folder: Path) -> list[Path]:
+    written = []
+    for path in sorted(work.iterdir()):
+        os.replace(path, folder / path.name)
+        written.append(folder / path.name)
     return written
 
 

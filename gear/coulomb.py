@@ -1,0 +1,43 @@
+"""Dry friction: one coefficient while sliding, one at rest."""
+
+from dataclasses import dataclass
+
+from gear.motion import Sliding
+from gear.quantities import Coefficient, Scalar, check
+
+
+@dataclass(frozen=True, kw_only=True)
+class Coulomb:
+    """Constant sliding friction with its own breakaway value.
+
+        mu(v) = sliding for v > 0,    mu(0) = static
+
+    Parameters
+    ----------
+    sliding, static : float
+        Coefficients while sliding and at breakaway [-], sliding <= static. The other order has no
+        consistent solution at breakaway (a contact that lets go would be held harder than before).
+
+    References
+    ----------
+    F. L. J. van der Linden, "Modeling of geared positioning systems", eq. (34).
+    """
+
+    sliding: Coefficient
+    static: Coefficient
+
+    def __post_init__(self) -> None:
+        check(self)
+        if self.static < self.sliding:
+            raise ValueError(
+                f"Coulomb needs sliding <= static, got sliding={self.sliding:g} and static={self.static:g}; "
+                "a breakaway coefficient below the sliding one has no consistent motion at standstill"
+            )
+
+    def coefficient(self, sliding: Sliding) -> Scalar:
+        """Sliding coefficient [-], the same everywhere."""
+        return self.sliding
+
+    def breakaway(self, sliding: Sliding) -> Scalar:
+        """Coefficient [-] that holds the mesh at rest."""
+        return self.static

@@ -1,0 +1,97 @@
+"""Friction by DIN 3990-4: a film of oil between rough teeth."""
+
+import math
+from dataclasses import dataclass
+
+import casadi as ca
+
+from gear.geometry import ExternalPair, GivenPair
+from gear.internal import InternalPair
+from gear.lubricant import Lubricants
+from gear.motion import Sliding
+from gear.quantities import HelixAngle, Length, PositiveCoefficient, Scalar, Share, check
+
+FORCE_FLOOR = 1e-3  # N; below it the coefficient is constant, as its slope over the force is infinite at zero
+SI = 1e-3  # the bracket with N/mm, um, mPa s, m/s, mm over the one with N/m, m, Pa s, m/s, m: 1e-3 1e6 / (1e3 1e3)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Din3990:
+    """Mean coefficient of friction of lubricated teeth by DIN 3990-4, never above the static one.
+
+        mu = min(static, 0.12 (w_bt R_a / (eta v_sum rho_redC))^0.25)
+
+        w_bt     = F_n / (effective_width face_width)                line load [N/mm]
+        R_a      = roughness [um],   eta = dynamic viscosity [mPa s]
+        v_sum    = 2 |v| sin(alpha)                                  sum of the rolling speeds [m/s]
+        rho_redC = r_A r_B sin(alpha) / ((r_A + r_B) cos(beta_b))    reduced radius at the pitch point [mm]
+
+    All inputs are in SI and are converted here. As mu grows without bound toward standstill, it is capped at
+    all speeds: a breakaway coefficient below the sliding one would have no consistent motion. Computed as
+
+        mu = static (v_cap / max(|v|, v_cap))^0.25,     v_cap = speed at which the formula gives `static`
+
+    which has finite slopes at zero speed. Thicker oil LOWERS this coefficient: what makes a cold gearbox heavy
+    (churning, seals, grease) is not in it and belongs to bearings or to a table of efficiencies.
+
+    Parameters
+    ----------
+    static : float
+        Coefficient at standstill and cap [-].
+    pair : ExternalPair, InternalPair or GivenPair
+        Radii and pressure angle; the pair of the mesh.
+    lubricant : GivenViscosity or OilAt
+        Viscosity, or an oil at a temperature.
+    roughness : float
+        Arithmetic mean roughness R_a of the flanks [m].
+    face_width : float
+        [m].
+    effective_width : float
+        Part of the face width that carries [-].
+    base_helix_angle : float or None
+        beta_b [rad]; None for that of the pair, zero for a GivenPair.
+
+    References
+    ----------
+    F. L. J. van der Linden, "Modeling of geared positioning systems", eqs. (35)-(37), after DIN 3990-4 (1987).
+    There the cap holds at standstill only, and the viscosity of 275 mPa s has the unit Pa s.
+    """
+
+    static: PositiveCoefficient
+    pair: ExternalPair | InternalPair | GivenPair
+    lubricant: Lubricants
+    roughness: Length
+    face_width: Length
+    effective_width: Share = 1.0
+    base_helix_angle: HelixAngle | None = None
+
+    def __post_init__(self) -> None:
+        check(self)
+        radius = self.reduced_radius()
+        if not (radius > 0 and math.isfinite(radius)):
+            raise ValueError(
+                f"Din3990.pair needs a positive reduced radius, got radius_a={self.pair.radius_a:g} m and "
+                f"radius_b={self.pair.radius_b:g} m"
+            )
+
+    def reduced_radius(self) -> Scalar:
+        """Reduced radius of curvature at the pitch point, rho_redC [m]."""
+        a, b, helix = self.pair.radius_a, self.pair.radius_b, self.base_helix_angle
+        if helix is None:
+            helix = 0.0 if isinstance(self.pair, GivenPair) else self.pair.gearing.base_helix_angle
+        return a * b / (a + b) * ca.sin(self.pair.working_angle) / ca.cos(helix)
+
+    def cap_speed(self, force: Scalar) -> Scalar:
+        """Mesh speed [m/s] below which the formula would exceed `static`, at a normal force [N]."""
+        line_load = ca.fmax(force, FORCE_FLOOR) / (self.effective_width * self.face_width)
+        film = self.lubricant.dynamic_viscosity() * self.reduced_radius() * 2 * ca.sin(self.pair.working_angle)
+        return SI * line_load * self.roughness / film * (0.12 / self.static) ** 4
+
+    def coefficient(self, sliding: Sliding) -> Scalar:
+        """Sliding coefficient [-]; falls with speed and viscosity, rises with the normal force."""
+        cap = self.cap_speed(sliding.force)
+        return self.static * (cap / ca.fmax(sliding.speed, cap)) ** 0.25
+
+    def breakaway(self, sliding: Sliding) -> Scalar:
+        """Coefficient [-] that holds the mesh at rest."""
+        return self.static

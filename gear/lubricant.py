@@ -1,0 +1,143 @@
+"""What lubricates a mesh: a given viscosity, or an oil at a temperature; and oils of aircraft and spacecraft."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from gear.oil import Oil
+from gear.quantities import DynamicViscosity, Scalar, Temperature, check
+from gear.viscosity import Vogel, Walther
+
+CELSIUS = 273.15  # K at 0 degC
+MM2 = 1e-6  # m^2
+
+# Expansion of the first two: slope of the specific gravity of their specifications between -60 and 160 degC in
+# The Lee Company, Technical Hydraulic Handbook, "Specific gravity of typical fluids vs. temperature".
+# Where the range begins at -55 degC and the coldest viscosity is known at -40 degC, the law is continued; Walther
+# and Vogel through the same points then differ by a fifth at -55 degC.
+
+MOBIL_JET_OIL_II = Oil(
+    # Polyol ester for turbines and gearboxes, MIL-PRF-23699 STD. ExxonMobil, product data sheet "Mobil Jet Oil II",
+    # typical values: 11 000, 27.6 and 5.1 mm^2/s, 1.0035 kg/l at 15 degC, pour point -59 degC.
+    name="Mobil Jet Oil II",
+    law=Vogel(
+        cold_temperature=CELSIUS - 40,
+        cold_viscosity=11_000 * MM2,
+        middle_temperature=CELSIUS + 40,
+        middle_viscosity=27.6 * MM2,
+        hot_temperature=CELSIUS + 100,
+        hot_viscosity=5.1 * MM2,
+    ),
+    density=1003.5,
+    density_temperature=CELSIUS + 15,
+    expansion=8.0e-4,
+    lowest=CELSIUS - 55,
+    highest=CELSIUS + 150,
+)
+
+XC_5606J = Oil(
+    # Red hydraulic fluid with viscosity improver, also a light lubricant for the cold, MIL-PRF-5606J. Phillips 66,
+    # technical data sheet "X/C Aviation Hydraulic Fluid 5606J", typical values: 2 450 (-54 degC), 495 (-40 degC),
+    # 13.5 and 5.1 mm^2/s, specific gravity 0.871 at 60 degF, pour point -64 degC.
+    name="X/C 5606J",
+    law=Vogel(
+        cold_temperature=CELSIUS - 54,
+        cold_viscosity=2_450 * MM2,
+        middle_temperature=CELSIUS + 40,
+        middle_viscosity=13.5 * MM2,
+        hot_temperature=CELSIUS + 100,
+        hot_viscosity=5.1 * MM2,
+    ),
+    density=870.2,
+    density_temperature=CELSIUS + 15.56,
+    expansion=8.0e-4,
+    lowest=CELSIUS - 55,
+    highest=CELSIUS + 135,
+)
+
+PENNZANE_X2000 = Oil(
+    # Multiply alkylated cyclopentane, base oil of space greases (Rheolube 2000). P. A. Bessette in NASA CP-3350,
+    # 31st Aerospace Mechanisms Symposium (1997), Table 6: 80 500 (-40 degC), 107 (40 degC) and 14.3 mm^2/s (100 degC),
+    # 0.84 g/ml at 25 degC, 8e-4 per K, pour point -55 degC.
+    name="Pennzane SHF X-2000",
+    law=Walther(
+        cold_temperature=CELSIUS - 40,
+        cold_viscosity=80_500 * MM2,
+        hot_temperature=CELSIUS + 40,
+        hot_viscosity=107 * MM2,
+    ),
+    density=840.0,
+    density_temperature=CELSIUS + 25,
+    expansion=8.0e-4,
+    lowest=CELSIUS - 55,
+    highest=CELSIUS + 125,
+)
+
+OILS = {oil.name: oil for oil in (MOBIL_JET_OIL_II, XC_5606J, PENNZANE_X2000)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class KnownOil:
+    """One of the oils above by its name, for files; its numbers are not parameters.
+
+    Parameters
+    ----------
+    name : str
+        "Mobil Jet Oil II", "X/C 5606J" or "Pennzane SHF X-2000".
+    """
+
+    name: Literal["Mobil Jet Oil II", "X/C 5606J", "Pennzane SHF X-2000"]
+
+    def __post_init__(self) -> None:
+        if self.name not in OILS:
+            raise ValueError(f"KnownOil.name must be one of {', '.join(OILS)}, got {self.name!r}")
+
+    def dynamic_viscosity(self, temperature: Scalar) -> Scalar:
+        """[Pa s] at a temperature [K]."""
+        return OILS[self.name].dynamic_viscosity(temperature)
+
+
+@dataclass(frozen=True, kw_only=True)
+class GivenViscosity:
+    """A lubricant of which only the viscosity is known.
+
+    Parameters
+    ----------
+    viscosity : float
+        Dynamic viscosity [Pa s].
+    """
+
+    viscosity: DynamicViscosity
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    def dynamic_viscosity(self) -> Scalar:
+        """[Pa s]."""
+        return self.viscosity
+
+
+@dataclass(frozen=True, kw_only=True)
+class OilAt:
+    """An oil at a temperature: cold start, room and warm are one argument.
+
+    Parameters
+    ----------
+    oil : Oil or KnownOil
+        Which.
+    temperature : float
+        [K]; within the range of the oil. As a parameter of a simulation it is not held against the range.
+    """
+
+    oil: Oil | KnownOil
+    temperature: Temperature
+
+    def __post_init__(self) -> None:
+        check(self)
+        self.dynamic_viscosity()  # for its range
+
+    def dynamic_viscosity(self) -> Scalar:
+        """[Pa s]."""
+        return self.oil.dynamic_viscosity(self.temperature)
+
+
+Lubricants = GivenViscosity | OilAt

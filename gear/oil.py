@@ -1,0 +1,81 @@
+"""Lubricating oils: viscosity and density over temperature."""
+
+from dataclasses import dataclass
+
+from gear.quantities import Density, Expansion, Scalar, Temperature, check
+from gear.viscosity import Vogel, Walther
+
+ROUNDING = 1e-6  # K; a temperature converted from degC may miss the end of the range by rounding
+
+
+@dataclass(frozen=True, kw_only=True)
+class Oil:
+    """A lubricant between its lowest and highest temperature.
+
+        density(T) = density (1 - expansion (T - density_temperature))
+        dynamic viscosity = density * kinematic viscosity
+
+    Parameters
+    ----------
+    law : Walther or Vogel
+        Viscosity over temperature.
+    density : float
+        At `density_temperature` [kg/m^3].
+    density_temperature : float
+        [K].
+    expansion : float
+        Thermal expansion coefficient [1/K].
+    lowest, highest : float
+        Temperatures between which the oil may be used [K].
+    name : str
+        For messages.
+
+    Raises
+    ------
+    ValueError
+        Where a number out of the range is asked for. An expression is not held against the range.
+    """
+
+    law: Walther | Vogel
+    density: Density
+    density_temperature: Temperature
+    expansion: Expansion
+    lowest: Temperature
+    highest: Temperature
+    name: str = "oil"
+
+    def __post_init__(self) -> None:
+        check(self)
+        if self.lowest >= self.highest:
+            raise ValueError(f"Oil.lowest must be < {self.highest:g} K, the highest, got {self.lowest:g} K")
+        end = self.law.lowest(self._density)
+        if self.lowest <= end:
+            raise ValueError(f"Oil.lowest must be > {end:.4g} K, where its law ends, got {self.lowest:g} K")
+        if self._density(self.highest) <= 0:
+            raise ValueError(f"Oil.expansion {self.expansion:g} 1/K leaves no density at {self.highest:g} K")
+
+    def _density(self, temperature: Scalar) -> Scalar:
+        return self.density * (1 - self.expansion * (temperature - self.density_temperature))
+
+    def density_at(self, temperature: Scalar) -> Scalar:
+        """[kg/m^3] at a temperature [K]."""
+        self.require_within(temperature)
+        return self._density(temperature)
+
+    def dynamic_viscosity(self, temperature: Scalar) -> Scalar:
+        """[Pa s] at a temperature [K]."""
+        self.require_within(temperature)
+        return self.law.dynamic_viscosity(temperature, self._density)
+
+    def kinematic_viscosity(self, temperature: Scalar) -> Scalar:
+        """[m^2/s] at a temperature [K]."""
+        return self.dynamic_viscosity(temperature) / self.density_at(temperature)
+
+    def require_within(self, temperature: Scalar) -> None:
+        """Refuse a number out of the range; an expression has no value yet."""
+        if isinstance(temperature, int | float) and not (
+            self.lowest - ROUNDING <= temperature <= self.highest + ROUNDING
+        ):
+            raise ValueError(
+                f"{self.name}: temperature must be from {self.lowest:g} K to {self.highest:g} K, got {temperature:g} K"
+            )

@@ -1,0 +1,99 @@
+"""Friction from the efficiency of a mesh, given over speed for each driving side."""
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from gear.geometry import ExternalPair, GivenPair
+from gear.internal import InternalPair
+from gear.motion import Sliding
+from gear.quantities import AtLeastOne, MeshSpeed, Scalar, Share, check
+from gear.speed_axis import require_axis
+from gear.tables import piecewise_linear
+
+
+@dataclass(frozen=True, kw_only=True)
+class EfficiencyPoint:
+    """An entry of an efficiency table.
+
+    Parameters
+    ----------
+    speed : float
+        Mesh speed [m/s].
+    a_drives, b_drives : float
+        Efficiency there where wheel A drives and where wheel B does [-], above 0 up to 1.
+    """
+
+    speed: MeshSpeed
+    a_drives: Share
+    b_drives: Share
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TabulatedEfficiency:
+    """Friction coefficients that give a mesh exactly the efficiencies of a table.
+
+    The efficiency is linear between the points and constant beyond the last. The torques of the mesh,
+    T_A = -F_n l_A - s e_A and T_B = -F_n l_B + s e_B with |s| = mu |F_n|, turn it into
+
+        A drives:  mu = cos(alpha) (1 - eta) / (e_B/r_B + eta e_A/r_A)
+        B drives:  mu = cos(alpha) (1 - eta) / (e_A/r_A + eta e_B/r_B)
+        static     = breakout * the larger of the two at standstill
+
+    The efficiency may be that of a whole cold gearbox lumped into one mesh: coefficients near one and above
+    follow from it and are accepted.
+
+    Parameters
+    ----------
+    points : tuple of EfficiencyPoint
+        Speeds increase from zero. Its numbers stay constants of a model; they are not parameters.
+    pair : ExternalPair, InternalPair or GivenPair
+        Radii, pressure angle and friction arms; the pair of the mesh.
+    breakout : float
+        Factor on the friction at standstill, >= 1 [-].
+
+    References
+    ----------
+    F. L. J. van der Linden, "Modeling of geared positioning systems", eqs. (38)-(39); the signs follow the
+    driving side, so that both coefficients are positive.
+    """
+
+    points: tuple[EfficiencyPoint, ...]
+    pair: ExternalPair | InternalPair | GivenPair
+    breakout: AtLeastOne = 1.0
+
+    def __post_init__(self) -> None:
+        check(self)
+        require_axis("TabulatedEfficiency", [point.speed for point in self.points])
+        a, b = self._arms()
+        for k, point in enumerate(self.points):
+            for side, arm, other in (("a", b, a), ("b", a, b)):
+                efficiency = getattr(point, f"{side}_drives")
+                if arm + efficiency * other <= 0:
+                    raise ValueError(
+                        f"TabulatedEfficiency.points[{k}].{side}_drives = {efficiency:g} cannot be reached: with "
+                        f"friction arms {a:.4g} r_A and {b:.4g} r_B, more friction does not lower the efficiency"
+                    )
+
+    def _arms(self) -> tuple[Scalar, Scalar]:
+        """Friction arms over pitch radii."""
+        return self.pair.friction_arm_a / self.pair.radius_a, self.pair.friction_arm_b / self.pair.radius_b
+
+    def _coefficients(self, speed: Scalar) -> tuple[Scalar, Scalar]:
+        """Coefficients where A drives and where B does."""
+        speeds, a_drives, b_drives = zip(*((p.speed, p.a_drives, p.b_drives) for p in self.points), strict=True)
+        eta_a, eta_b = piecewise_linear(speed, speeds, a_drives), piecewise_linear(speed, speeds, b_drives)
+        cosine, (a, b) = ca.cos(self.pair.working_angle), self._arms()
+        return cosine * (1 - eta_a) / (b + eta_a * a), cosine * (1 - eta_b) / (a + eta_b * b)
+
+    def coefficient(self, sliding: Sliding) -> Scalar:
+        """Sliding coefficient [-] for the side that drives."""
+        a_drives, b_drives = self._coefficients(sliding.speed)
+        return sliding.a_drives * a_drives + (1 - sliding.a_drives) * b_drives
+
+    def breakaway(self, sliding: Sliding) -> Scalar:
+        """Coefficient [-] that holds the mesh at rest; at rest no side drives."""
+        return self.breakout * ca.fmax(*self._coefficients(0.0))

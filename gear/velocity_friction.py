@@ -1,0 +1,128 @@
+"""Friction as a given function of the mesh speed: the Stribeck curve, or a table."""
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from gear.motion import Sliding
+from gear.quantities import (
+    AtLeastOne,
+    Coefficient,
+    MeshSpeed,
+    PositiveMeshSpeed,
+    Scalar,
+    ViscousCoefficient,
+    check,
+)
+from gear.speed_axis import require_axis
+from gear.tables import piecewise_linear
+
+SPEED_FLOOR = 1e-12  # m/s, added to the speed: keeps the logarithm in the slope over the exponent finite
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stribeck:
+    """Friction that falls from its static value over the Stribeck speed and rises with viscous drag.
+
+        mu(v) = coulomb + (static - coulomb) exp(-(v/stribeck_speed)^exponent) + viscous v
+
+        static  |.                             .
+                | .                  .
+                |  .         .                   The falling part is what makes a drive stick and slip.
+        coulomb +    . . .
+                +----+------------------ v
+                     stribeck_speed
+
+    Parameters
+    ----------
+    static, coulomb : float
+        Coefficient at standstill and level to which it falls [-], coulomb <= static.
+    stribeck_speed : float
+        Mesh speed over which it falls [m/s].
+    exponent : float
+        Shape of the fall, >= 1 [-]: 1 exponential, 2 Gaussian. Below one the slope at standstill is infinite.
+    viscous : float
+        Rise per mesh speed [s/m].
+
+    References
+    ----------
+    B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, "A survey of models, analysis tools and compensation
+    methods for the control of machines with friction", Automatica 30 (1994), 1083-1138.
+    """
+
+    static: Coefficient
+    coulomb: Coefficient
+    stribeck_speed: PositiveMeshSpeed
+    exponent: AtLeastOne = 2.0
+    viscous: ViscousCoefficient = 0.0
+
+    def __post_init__(self) -> None:
+        check(self)
+        if self.static < self.coulomb:
+            raise ValueError(
+                f"Stribeck needs coulomb <= static, got coulomb={self.coulomb:g} and static={self.static:g}; "
+                "a breakaway coefficient below the sliding one has no consistent motion at standstill"
+            )
+
+    def coefficient(self, sliding: Sliding) -> Scalar:
+        """Sliding coefficient [-]."""
+        fall = ca.exp(-(((sliding.speed + SPEED_FLOOR) / self.stribeck_speed) ** self.exponent))
+        return self.coulomb + (self.static - self.coulomb) * fall + self.viscous * sliding.speed
+
+    def breakaway(self, sliding: Sliding) -> Scalar:
+        """Coefficient [-] that holds the mesh at rest."""
+        return self.static
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrictionPoint:
+    """An entry of a friction table.
+
+    Parameters
+    ----------
+    speed : float
+        Mesh speed [m/s].
+    coefficient : float
+        Sliding coefficient there [-].
+    """
+
+    speed: MeshSpeed
+    coefficient: Coefficient
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrictionTable:
+    """Friction coefficients over mesh speed, linear between the points and constant beyond the last.
+
+    Parameters
+    ----------
+    points : tuple of FrictionPoint
+        Speeds increase from zero. Its numbers stay constants of a model; they are not parameters.
+    static : float
+        Coefficient at standstill [-], not below that of the first point.
+    """
+
+    points: tuple[FrictionPoint, ...]
+    static: Coefficient
+
+    def __post_init__(self) -> None:
+        check(self)
+        require_axis("FrictionTable", [point.speed for point in self.points])
+        first = self.points[0].coefficient
+        if self.static < first:
+            raise ValueError(
+                f"FrictionTable needs points[0].coefficient <= static, got {first:g} and static={self.static:g}; "
+                "a breakaway coefficient below the sliding one has no consistent motion at standstill"
+            )
+
+    def coefficient(self, sliding: Sliding) -> Scalar:
+        """Sliding coefficient [-]."""
+        speeds, values = zip(*((point.speed, point.coefficient) for point in self.points), strict=True)
+        return piecewise_linear(sliding.speed, speeds, values)
+
+    def breakaway(self, sliding: Sliding) -> Scalar:
+        """Coefficient [-] that holds the mesh at rest."""
+        return self.static

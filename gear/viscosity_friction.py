@@ -1,0 +1,51 @@
+"""Friction measured with one lubricant, used with another or at another temperature."""
+
+from dataclasses import dataclass
+
+from gear.lubricant import Lubricants
+from gear.motion import Sliding
+from gear.quantities import Scalar
+from gear.tabulated_efficiency import TabulatedEfficiency
+from gear.velocity_friction import FrictionTable, Stribeck
+
+
+@dataclass(frozen=True, kw_only=True)
+class AtViscosity:
+    """A law over speed, at the viscosity of a lubricant that is not the one it was measured with.
+
+        mu(v) = law(v eta / eta_measured)
+
+    The film between the flanks depends on speed times viscosity (the Hersey number eta v / load), so oil that is
+    twice as thick does at half the speed what the other did. Friction at standstill, where there is no film, is
+    unchanged.
+
+    Parameters
+    ----------
+    law : Stribeck, FrictionTable or TabulatedEfficiency
+        As measured.
+    lubricant : GivenViscosity or OilAt
+        In the mesh.
+    measured_with : GivenViscosity or OilAt
+        During the measurement.
+
+    References
+    ----------
+    M. D. Hersey, "The laws of lubrication of horizontal journal bearings", J. Washington Acad. Sci. 4 (1914), 542-552.
+    """
+
+    law: Stribeck | FrictionTable | TabulatedEfficiency
+    lubricant: Lubricants
+    measured_with: Lubricants
+
+    def _measured(self, sliding: Sliding) -> Sliding:
+        """The state of the measurement with the same film."""
+        thicker = self.lubricant.dynamic_viscosity() / self.measured_with.dynamic_viscosity()
+        return sliding._replace(speed=sliding.speed * thicker)
+
+    def coefficient(self, sliding: Sliding) -> Scalar:
+        """Sliding coefficient [-]."""
+        return self.law.coefficient(self._measured(sliding))
+
+    def breakaway(self, sliding: Sliding) -> Scalar:
+        """Coefficient [-] that holds the mesh at rest."""
+        return self.law.breakaway(sliding)

@@ -1,0 +1,349 @@
+"""The verdict on hunting, from runs whose answer is known.
+
+Oracles: runs made by hand from cycles of known period, amplitude and stick fraction; describing functions for a loop
+with limited torque; the times of the engine's own events for a loop with backlash; unstable loads.
+"""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from actuator import (
+    Actuator,
+    Load,
+    ModeChange,
+    Ramp,
+    Run,
+    Step,
+    TorqueSource,
+    classify,
+    loop_transfer,
+    margins,
+    simulate,
+    trim,
+)
+from actuator.hunting import stuck_fraction, turning_points
+from actuator.hybrid import Quantity
+from actuator.run import Statistics
+from controllers import PID
+from gear import Backlash, Bearing, Coulomb, Coupling, ExternalPair, Linear, Mesh, Shaft, Transmission
+
+CONTACT = "gear.bearings.only"
+
+# -- runs by hand -------------------------------------------------------------------------------------------
+
+
+def run_of(time, load, *, changes=(), mode="forward", reference=None, integral=None):
+    """A run in which the load, and the motor ten times as far, moved as given, with one contact."""
+    signals = {"load_angle": load, "motor_angle": 10 * load}
+    inputs, states = (), ()
+    if reference is not None:
+        inputs, signals["reference"] = (Quantity("reference", "rad"),), reference
+    if integral is not None:
+        states, signals["controller.integral"] = (Quantity("controller.integral", "N m"),), integral
+    words = np.array([mode, *(after for _, after in changes)])
+    row = words[np.searchsorted([moment for moment, _ in changes], time, side="right")]
+    return Run(
+        system=SimpleNamespace(inputs=inputs, states=states),
+        t=time,
+        signals=signals,
+        units=dict.fromkeys(signals, "rad"),
+        modes={CONTACT: row},
+        mode_values=np.zeros((1, len(time))),
+        changes=tuple(
+            ModeChange(moment, CONTACT, str(before), after)
+            for (moment, after), before in zip(changes, words, strict=False)
+        ),
+        margins=np.zeros((0, len(time))),
+        parameters=np.zeros(0),
+        statistics=Statistics(wall_s=0.0, simulated_s=time[-1], events=len(changes), settled=0, compiled=False),
+    )
+
+
+def periodic(corners, period, cycles, points=4000):
+    """A run along straight lines through (part of the period, angle), stuck where a line is level."""
+    shares, angles = np.array([*corners, (1.0, corners[0][1])]).T
+    time = np.linspace(0, cycles * period, points + 1)
+    load = np.interp(time / period % 1.0, shares, angles)
+    level = [a == b for a, b in zip(angles, angles[1:], strict=False)]
+    words = ["stuck" if flat else "forward" for flat in level]
+    changes = [
+        (period * (cycle + share), word)
+        for cycle in range(cycles)
+        for share, word in zip(shares[:-1], words, strict=True)
+    ]
+    changes = [
+        change for before, change in zip([(0.0, "forward"), *changes], changes, strict=False) if change[1] != before[1]
+    ]
+    return run_of(time, load, changes=changes[1:] if changes[0][0] == 0 else changes, mode=words[0])
+
+
+CYCLES = {
+    "stick-slip": ([(0, -1), (0.1, 1), (0.5, 1), (0.6, -1)], 1.0, 0.8),
+    "fast up, slow down": ([(0, -1), (0.05, 1), (0.35, 1), (0.9, -1)], 1.0, 0.4),
+    "two stops on the way up and one at the top": ([(0, -1), (0.1, 0), (0.3, 0), (0.4, 1), (0.7, 1)], 1.0, 0.5),
+    "a small swing inside a large one": (
+        [(0, 0), (0.1, 1), (0.3, 1), (0.4, 0.4), (0.5, 0.4), (0.6, 2), (0.8, 2)],
+        1.0,
+        0.5,
+    ),
+    "unequal upper stops": ([(0, -1), (0.1, 1), (0.4, 1), (0.5, -1), (0.55, -1), (0.65, 0.5), (0.9, 0.5)], 1.0, 0.6),
+}
+
+
+@pytest.mark.parametrize("period", [0.02, 3.0, 400.0])
+@pytest.mark.parametrize("name", CYCLES)
+def test_a_cycle_with_stops_is_hunting_with_its_period_amplitude_and_stick_fraction(name, period):
+    corners, amplitude, stuck = CYCLES[name]
+    hunting = classify(periodic(corners, period, cycles=20))
+    assert hunting.verdict == "hunting", hunting.reason
+    assert hunting.cycles
+    assert hunting.period_s == pytest.approx(period, rel=1e-3)
+    assert hunting.amplitude_rad == pytest.approx(amplitude, rel=0.02)
+    assert hunting.motor_amplitude_rad == pytest.approx(10 * amplitude, rel=0.02)
+    assert hunting.stick_fraction == pytest.approx(stuck, abs=0.005)
+
+
+@pytest.mark.parametrize("points", [16, 25, 33, 50, 77, 200])
+def test_the_period_does_not_depend_on_the_number_of_output_points(points):
+    time = np.arange(60 * points) / points * 0.9817
+    hunting = classify(run_of(time, np.sin(2 * np.pi * time / 0.9817 * 1.0037)))
+    assert hunting.verdict == "limit cycle without sticking", hunting.reason
+    assert hunting.period_s == pytest.approx(0.9817 / 1.0037, rel=1e-2)
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e3])
+def test_the_verdict_does_not_depend_on_the_size_of_the_cycle(scale):
+    time = np.linspace(0, 30, 3001)
+    hunting = classify(run_of(time, scale * np.sin(2 * np.pi * time)))
+    assert hunting.verdict == "limit cycle without sticking"
+    assert hunting.amplitude_rad == pytest.approx(scale, rel=1e-3)
+    assert hunting.stick_fraction == 0
+
+
+def test_a_cycle_reached_after_a_transient_is_found():
+    time = np.linspace(0, 60, 6001)
+    hunting = classify(run_of(time, (1 + 3 * np.exp(-time / 5)) * np.sin(2 * np.pi * time)))
+    assert hunting.verdict == "limit cycle without sticking"
+    assert hunting.amplitude_rad == pytest.approx(1.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("growth", [1.15, 1.5, 3.0, 20.0])
+def test_growing_swings_are_diverging(growth):
+    time = np.linspace(0, 20, 4001)
+    hunting = classify(run_of(time, 1e-3 * growth ** (2 * time) * np.sin(2 * np.pi * time)))  # per half period
+    assert hunting.verdict == "diverging", hunting.reason
+    assert math.isnan(hunting.period_s)
+
+
+@pytest.mark.parametrize("decay", [0.9, 0.5, 0.1])
+def test_shrinking_swings_are_on_their_way_to_rest(decay):
+    time = np.linspace(0, 20, 4001)
+    hunting = classify(run_of(time, decay ** (2 * time) * np.sin(2 * np.pi * time)))
+    assert hunting.verdict == "rest", hunting.reason
+
+
+def test_a_load_that_stands_still_is_at_rest():
+    time = np.linspace(0, 10, 1001)
+    assert classify(run_of(time, np.minimum(time, 2.0))).verdict == "rest"
+    assert classify(run_of(time, 1 - np.exp(-time / 0.3))).verdict == "rest"
+
+
+def test_a_load_that_stands_still_while_the_integrator_runs_is_not_at_rest():
+    time = np.linspace(0, 10, 1001)
+    hunting = classify(run_of(time, np.minimum(time, 2.0), integral=0.1 * time))
+    assert hunting.verdict == "irregular"
+    assert "controller.integral still moves, by 0.249 N m in the last quarter; simulate longer" in hunting.reason
+    assert classify(run_of(time, np.minimum(time, 2.0), integral=np.exp(-time / 0.3))).verdict == "rest"
+
+
+def test_a_load_that_still_travels_is_not_at_rest():
+    time = np.linspace(0, 10, 1001)
+    for load in (time, 1 - np.exp(-time / 8), np.sin(2 * np.pi * time / 60)):
+        assert classify(run_of(time, load)).verdict == "irregular"
+
+
+def test_two_stops_before_the_integrator_lets_go_again_are_not_rest():
+    # the first 30 s of a cycle of 23 s: a step, an overshoot, a long stop behind which the torque builds up
+    time = np.linspace(0, 30, 3001)
+    load = np.interp(time, [0, 3, 5, 8, 20, 22, 30], [0, 1.3, 1.3, 0.7, 0.7, 1.07, 1.07])
+    hunting = classify(run_of(time, load, integral=np.where(time > 22, 0.28 * (time - 22), 0.0)))
+    assert hunting.verdict == "irregular", hunting.reason
+
+
+def test_swings_without_a_pattern_are_irregular():
+    time = np.linspace(0, 100, 20_001)
+    hunting = classify(run_of(time, np.sin(2 * np.pi * time) + np.sin(2 * np.pi * math.sqrt(2) * time)))
+    assert hunting.verdict == "irregular"
+    assert "swings of the load in 100 s neither repeat nor settle" in hunting.reason
+
+
+@pytest.mark.parametrize("cycles", [0.3, 0.8, 1.4])
+def test_less_than_two_periods_are_too_short_for_a_verdict(cycles):
+    time = np.linspace(0, cycles, 2001)
+    hunting = classify(run_of(time, np.sin(2 * np.pi * time)))
+    assert hunting.verdict == "irregular"
+    assert "simulate longer" in hunting.reason
+
+
+def test_too_few_points_after_the_last_change_of_an_input_are_too_short_for_a_verdict():
+    time = np.linspace(0, 10, 1001)
+    hunting = classify(run_of(time, np.sin(time), reference=(time >= 9.9).astype(float)))
+    assert hunting.verdict == "irregular"
+    assert "only 11 output points after the last change of an input; simulate longer" in hunting.reason
+
+
+def test_only_the_time_after_the_last_change_of_an_input_counts():
+    time = np.linspace(0, 40, 8001)
+    load = np.where(time < 10, np.sin(2 * np.pi * 3 * time), 0.2 * np.sin(2 * np.pi * time))
+    hunting = classify(run_of(time, load, reference=(time >= 10).astype(float)))
+    assert hunting.period_s == pytest.approx(1.0, rel=1e-3)
+    later = classify(run_of(time, np.where(time < 20, load, 0.0)), since=25.0)
+    assert later.verdict == "rest"
+
+
+def test_an_input_that_never_stops_changing_gives_no_verdict():
+    time = np.linspace(0, 10, 1001)
+    assert classify(run_of(time, time, reference=time)).verdict == "irregular"
+
+
+def test_a_cycle_that_crawls_away_keeps_its_period():
+    time = np.linspace(0, 40, 8001)
+    hunting = classify(run_of(time, np.sin(2 * np.pi * time) + 1e-3 * time))
+    assert hunting.verdict == "limit cycle without sticking"
+    assert hunting.period_s == pytest.approx(1.0, rel=1e-3)
+
+
+def test_turning_points_count_a_plateau_at_its_first_point():
+    signal = np.array([0.0, 0.5, 1.0, 1.0, 1.0, 0.2, -1.0, -1.0, 0.5, 0.45, 1.0, 0.0])
+    assert turning_points(signal, 0.1) == [0, 2, 6, 10]  # the start opens the first swing
+    assert turning_points(signal, 5.0) == []
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "expected"),
+    [(0.0, 10.0, 0.4), (1.5, 2.5, 0.5), (2.5, 4.5, 0.75), (4.03, 5.0, 0.0), (2.2, 3.3, 1.0)],
+)
+@pytest.mark.parametrize("points", [11, 101, 10_001])
+def test_the_stuck_fraction_comes_from_the_times_of_the_changes(start, end, expected, points):
+    time = np.linspace(0, 10, points)
+    run = run_of(time, time, changes=[(2.0, "stuck"), (4.0, "forward"), (8.0, "stuck")])
+    assert stuck_fraction(run, start, end) == pytest.approx(expected, abs=1e-12)
+
+
+# -- runs of simple systems ---------------------------------------------------------------------------------
+
+TORQUE_LIMIT = 2.0  # N m
+
+
+def two_masses(proportional, torque_limit=TORQUE_LIMIT):
+    """A torque on one mass positions the other, on a spring behind it: too much gain is unstable."""
+    gear = Transmission(
+        shafts={"motor": Shaft(inertia=1.0), "load": Shaft(inertia=2.0)},
+        couplings={"shaft": Coupling(a="motor", b="load", stiffness=50.0, damping=0.2)},
+        input="motor",
+        output="load",
+    )
+    return Actuator(
+        motor=TorqueSource(torque_limit=torque_limit),
+        gear=gear,
+        load=Load(damping=1.5),
+        controller=PID(proportional=proportional, integral=0.0, derivative=0.0),
+    )
+
+
+def critical():
+    """Largest stable gain, and the frequency [rad/s] at which the loop oscillates there."""
+    point = trim(two_masses(1.0), "forward")
+    found = margins(loop_transfer(point, "position"))
+    return found.gain, found.gain_frequency
+
+
+@pytest.mark.parametrize("resolution", [None, 0.01])
+def test_an_unstable_loop_with_limited_torque_cycles_as_its_describing_function_says(resolution):
+    gain, frequency = critical()
+    proportional = 3 * gain
+    # the limiter passes a third of a sine with this amplitude, over the one at which it sets in
+    ratio = brentq(lambda a: 2 / math.pi * (math.asin(1 / a) + math.sqrt(1 - 1 / a**2) / a) - 1 / 3, 1.001, 100)
+    hunting = classify(
+        simulate(two_masses(proportional), 60.0, inputs={"reference": 0.01}, resolution=resolution, compiled=False)
+    )
+    assert hunting.verdict == "limit cycle without sticking", hunting.reason
+    assert hunting.period_s == pytest.approx(2 * math.pi / frequency, rel=0.01)
+    assert hunting.amplitude_rad == pytest.approx(ratio * TORQUE_LIMIT / proportional, rel=0.02)
+
+
+def test_the_same_loop_with_less_gain_comes_to_rest():
+    plant = two_masses(0.3 * critical()[0])
+    assert classify(simulate(plant, 120.0, inputs={"reference": 0.01}, compiled=False)).verdict == "rest"
+
+
+@pytest.mark.parametrize(("times", "duration"), [(1.05, 12.0), (1.5, 10.0), (3.0, 6.0)])
+def test_the_same_loop_without_a_limit_diverges(times, duration):
+    plant = two_masses(times * critical()[0], torque_limit=None)
+    hunting = classify(simulate(plant, duration, inputs={"reference": 0.01}, compiled=False))
+    assert hunting.verdict == "diverging", hunting.reason
+
+
+def test_backlash_cycles_without_sticking():
+    mesh = Mesh(
+        a="motor",
+        b="load",
+        pair=ExternalPair(teeth_a=20, teeth_b=60, module=1e-3),
+        elasticity=Backlash(gap=1e-4, law=Linear(stiffness=1e7, damping=1e4)),
+        friction=Coulomb(sliding=0.0, static=0.0),
+    )
+    gear = Transmission(
+        shafts={"motor": Shaft(inertia=1e-3), "load": Shaft(inertia=9e-3)},
+        meshes={"mesh": mesh},
+        input="motor",
+        output="load",
+    )
+    plant = Actuator(motor=TorqueSource(), gear=gear, controller=PID(proportional=5.0, integral=10.0, derivative=0.3))
+    run = simulate(plant, 10.0, inputs={"reference": 0.1}, resolution=2e-3, compiled=False)
+    engaged = [change.time for change in run.changes if change.before == "free"]
+    hunting = classify(run)
+    assert hunting.verdict == "limit cycle without sticking"
+    assert hunting.stick_fraction == 0
+    assert hunting.period_s == pytest.approx(engaged[-1] - engaged[-3], rel=1e-3)
+    # about half the gap of 0.1 mm on the wheel's 30 mm
+    assert 1e-4 < hunting.amplitude_rad < 1e-2
+
+
+def unstable_load(controller, start):
+    """A mass on a spring that pushes away from the middle."""
+    guide = Bearing(shaft="mass", coulomb=0.0, breakaway=0.0)
+    gear = Transmission(shafts={"mass": Shaft(inertia=1.0)}, bearings={"guide": guide}, input="mass", output="mass")
+    plant = Actuator(motor=TorqueSource(), gear=gear, load=Load(stiffness=-10.0), controller=controller)
+    return classify(simulate(plant, 6.0, start={"mass.angle": start}, compiled=False))
+
+
+def test_an_unstable_load_without_control_diverges():
+    hunting = unstable_load(None, 1e-3)
+    assert hunting.verdict == "diverging", hunting.reason
+
+
+def test_an_unstable_load_under_a_controller_without_damping_diverges():
+    hunting = unstable_load(PID(proportional=400.0, integral=2000.0, derivative=0.0), 1e-3)
+    assert hunting.verdict == "diverging", hunting.reason
+
+
+def test_an_unstable_load_under_a_good_controller_comes_to_rest():
+    assert unstable_load(PID(proportional=110.0, integral=100.0, derivative=20.0), 1e-3).verdict == "rest"
+
+
+def test_a_reference_that_keeps_moving_gives_no_verdict_and_says_why():
+    plant = two_masses(10.0)
+    hunting = classify(simulate(plant, 10.0, inputs={"reference": Ramp(slope=0.1)}, compiled=False))
+    assert hunting.verdict == "irregular"
+    assert "after the last change of an input" in hunting.reason
+
+
+def test_a_late_step_is_judged_by_what_follows_it():
+    plant = two_masses(0.3 * critical()[0])
+    hunting = classify(simulate(plant, 100.0, inputs={"reference": Step(time=99.8, after=0.1)}, compiled=False))
+    assert hunting.verdict == "irregular"
+    assert "simulate longer" in hunting.reason

@@ -1,0 +1,284 @@
+"""The command line: what it writes, what it says, and what it refuses.
+
+Oracles: the cycle of a mass on a guide in closed form (see test_system_hunting_mass.py), written as a case file; the
+two built-in cases, of which one hunts and one comes to rest; HTML that needs nothing but itself; the texts of errors.
+"""
+
+import json
+import math
+import re
+from html.parser import HTMLParser
+
+import pytest
+from click.testing import CliRunner
+
+from studies import built_in
+from studies.__main__ import main
+
+MASS = """
+title = "Mass on a guide"
+description = "It hunts."
+
+[motor]
+type = "TorqueSource"
+
+[gear]
+input = "mass"
+output = "mass"
+
+[gear.shafts]
+mass = { inertia = 1.0 }
+
+[gear.bearings]
+guide = { shaft = "mass", coulomb = 1.0, breakaway = 1.5 }
+
+[controller]
+type = "PID"
+proportional = 3
+integral = 4
+derivative = 6
+
+[scenario]
+duration = 100
+
+[scenario.inputs.reference]
+type = "Constant"
+value = 1.0
+"""
+PNG = b"\x89PNG\r\n\x1a\n"
+
+
+def invoke(*arguments):
+    """Run the command line in this process."""
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+@pytest.fixture
+def case_file(tmp_path):
+    """Write a case file from its text."""
+
+    def write(text, name="mass.toml"):
+        path = tmp_path / name
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+@pytest.fixture(scope="module")
+def mass(tmp_path_factory):
+    """The outcome of the mass, and the folder with what was written."""
+    folder = tmp_path_factory.mktemp("mass")
+    path = folder / "mass.toml"
+    path.write_text(MASS, encoding="utf-8")
+    return invoke(path, "--out", folder / "out"), folder / "out"
+
+
+@pytest.fixture(scope="module", params=["aileron", "aileron-retuned"])
+def aileron(request, tmp_path_factory):
+    """A built-in case: its name, the outcome, and the result."""
+    out = tmp_path_factory.mktemp(request.param)
+    outcome = invoke("--case", request.param, "--out", out)
+    return request.param, outcome, json.loads((out / "result.json").read_text(encoding="utf-8"))
+
+
+# -- help ---------------------------------------------------------------------------------------------------
+
+
+def test_the_list_names_every_built_in_case_with_its_title():
+    outcome = invoke("--list")
+    assert outcome.exit_code == 0
+    lines = outcome.output.splitlines()
+    assert [line.split()[0] for line in lines] == built_in()
+    assert all(len(line.split()) > 1 for line in lines)
+
+
+def test_help_tells_the_options_and_their_defaults():
+    outcome = invoke("--help")
+    assert outcome.exit_code == 0
+    for word in ("--case", "--out", "--list", "PATH.toml", "benchmark", "default: aileron", "default: out"):
+        assert word in outcome.output
+
+
+# -- what is written ----------------------------------------------------------------------------------------
+
+
+def test_a_case_file_gives_a_verdict_in_words_and_numbers(mass):
+    outcome, out = mass
+    assert outcome.exit_code == 0, outcome.output
+    assert "verdict: hunting" in outcome.output
+    assert "period 23.37 s, amplitude 67.24 mrad at the load, stuck for 78% of the time" in outcome.output
+    assert str(out / "report.html") in outcome.output
+
+
+def test_everything_that_is_announced_is_written_and_nothing_else(mass):
+    outcome, out = mass
+    written = sorted(path.name for path in out.iterdir())
+    assert {"report.html", "result.json"} < set(written)
+    assert f"and {len(written) - 1} more files" in outcome.output
+    pictures = [name for name in written if name.endswith(".png")]
+    assert sorted([*pictures, "report.html", "result.json"]) == written
+    assert all((out / name).read_bytes().startswith(PNG) for name in pictures)
+
+
+class References(HTMLParser):
+    """Collects what a page refers to."""
+
+    def __init__(self):
+        super().__init__()
+        self.found, self.images = [], 0
+
+    def handle_starttag(self, tag, attributes):
+        self.images += tag == "img"
+        names = ("src", "href", "srcset", "data", "poster", "action")
+        self.found += [value for name, value in attributes if name in names]
+
+
+def test_the_report_needs_no_other_file(mass):
+    _, out = mass
+    page = (out / "report.html").read_text(encoding="utf-8")
+    references = References()
+    references.feed(page)
+    assert references.images == len(list(out.glob("*.png")))
+    assert [value[:40] for value in references.found if not value.startswith(("data:", "#"))] == []
+    assert re.findall(r"https?://|file:|url\(|@import", page) == []
+    assert "<title>Mass on a guide</title>" in page
+    assert "hunting" in page
+
+
+def test_the_result_holds_the_verdict_the_margins_and_the_cost(mass):
+    result = json.loads((mass[1] / "result.json").read_text(encoding="utf-8"))
+    assert result["case"] == "mass"
+    hunting, simulation = result["hunting"], result["simulation"]
+    assert hunting["verdict"] == "hunting"
+    assert hunting["period_s"] == pytest.approx(23.3693, rel=1e-3)
+    assert hunting["amplitude_rad"] == pytest.approx(0.067240, rel=1e-3)
+    assert hunting["stick_fraction"] == pytest.approx(0.780187, rel=2e-3)
+    assert set(result["margins"]) == {"position", "torque_reference"}
+    assert set(result["margins"]["position"]) == {"stuck", "forward", "backward"}
+    # by hand, the loop is (3 + 4/s)/(s^2 + 6 s)
+    crossing = result["margins"]["position"]["forward"]["phase_frequency"]
+    assert math.hypot(3, 4 / crossing) == pytest.approx(crossing * math.hypot(crossing, 6), rel=1e-6)
+    assert simulation["simulated_s"] == 100
+    assert simulation["wall_s"] > 0
+    assert simulation["events"] == 19
+    assert {"python", "casadi", "control", "numpy", "scipy"} <= set(result["versions"])
+
+
+def test_a_result_without_a_cycle_holds_null_and_no_nan(case_file, tmp_path):
+    path = case_file(MASS.replace("breakaway = 1.5", "breakaway = 1.0"))
+    outcome = invoke(path, "--out", tmp_path / "out")
+    assert outcome.exit_code == 0, outcome.output
+    assert "period" not in outcome.output
+    text = (tmp_path / "out" / "result.json").read_text(encoding="utf-8")
+    assert "NaN" not in text and "Infinity" not in text
+    assert json.loads(text)["hunting"]["period_s"] is None
+
+
+def test_a_case_without_a_controller_is_reported_too(case_file, tmp_path):
+    start, end = MASS.index("[controller]"), MASS.index("[scenario]")
+    text = (MASS[:start] + MASS[end:]).replace("inputs.reference", "inputs.torque_reference")
+    outcome = invoke(case_file(text.replace("duration = 100", "duration = 1")), "--out", tmp_path / "out")
+    assert outcome.exit_code == 0, outcome.output
+    assert (tmp_path / "out" / "report.html").exists()
+
+
+def test_a_second_run_replaces_the_first(case_file, tmp_path):
+    out = tmp_path / "out"
+    for duration in (1, 2):
+        path = case_file(MASS.replace("duration = 100", f"duration = {duration}"))
+        assert invoke("--out", out, path).exit_code == 0  # before or after the path
+        result = json.loads((out / "result.json").read_text(encoding="utf-8"))
+        assert result["simulation"]["simulated_s"] == duration
+    assert [path.name for path in out.iterdir() if path.name.startswith(".")] == []
+
+
+# -- the built-in cases -------------------------------------------------------------------------------------
+
+
+def test_the_aileron_hunts_and_comes_to_rest_when_retuned(aileron):
+    name, outcome, result = aileron
+    assert outcome.exit_code == 0, outcome.output
+    hunting = result["hunting"]
+    if name == "aileron":
+        assert hunting["verdict"] == "hunting"
+        assert 0.1 < hunting["period_s"] < 10
+        assert 1e-5 < hunting["amplitude_rad"] < 0.1
+        assert 0 < hunting["stick_fraction"] < 1
+    else:
+        assert hunting["verdict"] == "rest"
+        assert hunting["period_s"] is None
+
+
+def test_the_aileron_has_margins_at_every_loop_in_every_mode(aileron):
+    _, _, result = aileron
+    assert result["not_linearized"] == {}
+    assert set(result["margins"]) == {"position", "speed_reference", "torque_reference", "voltage"}
+    for loop in result["margins"].values():
+        assert set(loop) == {"stuck", "forward", "backward"}
+        for mode in ("forward", "backward"):
+            assert loop[mode]["phase_deg"] > 0
+
+
+# -- what is refused ----------------------------------------------------------------------------------------
+
+WRONG = {
+    "a value out of range": (
+        "inertia = 1.0",
+        "inertia = -1.0",
+        "gear.shafts.mass.inertia must be > 0 kg m^2, got -1 kg m^2",
+    ),
+    "a rule between two values": ("breakaway = 1.5", "breakaway = 0.5", "got coulomb=1 N m and breakaway=0.5 N m"),
+    "a misspelled key": ("coulomb", "coulom", "gear.bearings.guide.coulom"),
+    "a string for a number": (
+        "proportional = 3",
+        'proportional = "3"',
+        'controller.proportional = "3" must be a number',
+    ),
+    "an unknown input": ("inputs.reference", "inputs.referense", "did you mean reference"),
+    "an unknown shaft": ('input = "mass"', 'input = "masss"', "names shaft 'masss'; the shafts are mass"),
+    "no duration": ("duration = 100", "", "scenario.duration is missing; it must be a number [s]"),
+    "not TOML": ("title = ", "title : ", "not valid TOML"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_wrong_file_is_refused_in_one_line_and_nothing_is_written(name, case_file, tmp_path):
+    right, wrong, message = WRONG[name]
+    assert right in MASS
+    path = case_file(MASS.replace(right, wrong, 1))
+    outcome = invoke(path, "--out", tmp_path / "out")
+    assert outcome.exit_code == 2
+    assert message in outcome.output
+    assert str(path) in outcome.output
+    assert len(outcome.output.strip().splitlines()) == 1
+    assert "Traceback" not in outcome.output
+    assert isinstance(outcome.exception, SystemExit)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("arguments", [("--case", "ailerons"), ("nowhere.toml",)])
+def test_an_unknown_case_is_refused_with_the_names_of_all(arguments, tmp_path):
+    outcome = invoke(*arguments, "--out", tmp_path / "out")
+    assert outcome.exit_code == 2
+    assert "cannot be read" in outcome.output
+    assert ", ".join(built_in()) in outcome.output
+    assert "Traceback" not in outcome.output
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_unknown_option_and_an_unknown_command_are_refused():
+    for argument in ("--cases", "simulate"):
+        outcome = invoke(argument)
+        assert outcome.exit_code == 2
+        assert "No such" in outcome.output
+
+
+def test_a_run_that_cannot_be_completed_is_told_in_one_line_and_nothing_is_written(case_file, tmp_path):
+    # pushed away from the middle by its load, the mass is beyond all numbers after 230 s
+    text = MASS[: MASS.index("[controller]")] + "[load]\nstiffness = -10\nbias = 2\n[scenario]\nduration = 300\n"
+    outcome = invoke(case_file(text), "--out", tmp_path / "out")
+    assert outcome.exit_code not in (0, 2)
+    assert isinstance(outcome.exception, SystemExit), repr(outcome.exception)
+    assert "cannot go on" in outcome.output
+    assert not (tmp_path / "out").exists()

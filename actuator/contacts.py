@@ -128,7 +128,7 @@ class ContactMechanics:
             for k, other in enumerate(rows):
                 compliance[i, k] = sum(c * other[s] / self.masses[s] for s, c in row.items() if s in other)
         kept = friction(compliance, demand, ca.SX.ones(len(rows)), ca.SX.zeros(len(rows)), redundant=True)
-        return {name: kept[k] / ca.cos(self.gear.meshes[name].pair.pressure_angle) for k, name in enumerate(rigid)}
+        return {name: kept[k] / ca.cos(self.gear.meshes[name].pair.working_angle) for k, name in enumerate(rigid)}
 
     def friction_torques(self, scalar: Matrix) -> dict[str, Scalar]:
         """Torque on each shaft from the friction scalars."""

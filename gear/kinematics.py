@@ -2,8 +2,6 @@
 
 from collections.abc import Mapping
 
-import numpy as np
-
 from gear.elimination import factorize, substitute
 from gear.quantities import Matrix, Scalar
 
@@ -92,11 +90,3 @@ def _insert(row: Row, known: Mapping[str, Row]) -> Row:
         for other, turn in known[shaft].items() if shaft in known else [(shaft, 1.0)]:
             result[other] = result[other] + value * turn if other in result else value * turn
     return result
-
-
-def null_space(matrix: np.ndarray) -> np.ndarray:
-    """Orthonormal motions that leave every row of `matrix` at zero, one per column."""
-    if not len(matrix):
-        return np.eye(matrix.shape[1])
-    _, values, rows = np.linalg.svd(matrix)
-    return rows[int((values > PIVOT * values.max()).sum()) :].T

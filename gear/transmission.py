@@ -7,7 +7,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from gear.kinematics import Kinematics, null_space
+from gear.kinematics import Kinematics
 from gear.mesh import MESH_SPEED_NOMINAL, Mesh
 from gear.motion import MeshMotion, Sliding
 from gear.quantities import Scalar
@@ -179,20 +179,16 @@ class Transmission:
         """Turns of every shaft per turn of the output shaft, all teeth and couplings rigid; errors as `ratio`."""
         rigid = [mesh.deflection_per_shaft() for mesh in self.meshes.values()] + [{name: 1.0} for name in self.fixed]
         rigid += [{coupling.a: 1.0, coupling.b: -1.0} for coupling in self.couplings.values()]
-        names = list(self.shafts)
-        motions = null_space(self._matrix(rigid))
-        ends = motions[[names.index(self.input), names.index(self.output)]]
-        if motions.shape[1] != 1 or abs(ends[1]).max() < RANK:
+        kinematics = Kinematics(list(self.shafts), rigid, rigid, keep=[self.output])
+        free = kinematics.independent
+        turns = {name: float(row.get(free[0], 0.0)) for name, row in kinematics.turns.items()} if free else {}
+        if len(free) != 1 or abs(turns[self.output]) < RANK * max(abs(turn) for turn in turns.values()):
             raise ValueError(
                 f"Transmission: {self.input!r} (input) and {self.output!r} (output) are not joined by one speed ratio: "
-                f"with rigid teeth {motions.shape[1]} speeds are free; "
-                + ("fix a shaft, or join what is loose" if motions.shape[1] else "the constraints lock the train")
+                f"with rigid teeth {len(free)} speeds are free; "
+                + ("fix a shaft, or join what is loose" if free else "the constraints lock the train")
             )
-        moving = motions[:, 0]
-        return {
-            name: float(turns) + 0.0
-            for name, turns in zip(names, moving / moving[names.index(self.output)], strict=True)
-        }
+        return {name: turn / turns[self.output] + 0.0 for name, turn in turns.items()}
 
     def _matrix(self, rows: list[dict[str, Scalar]]) -> np.ndarray:
         """Coefficients per shaft as a matrix, each row scaled to one."""
@@ -269,7 +265,7 @@ class Transmission:
         stored = 0.0
         for name, motion in motions.items():
             mesh = self.meshes[name]
-            stored += ca.cos(mesh.pair.pressure_angle) * mesh.count * mesh.law().stored(motion, flank[name])
+            stored += ca.cos(mesh.pair.working_angle) * mesh.count * mesh.law().stored(motion, flank[name])
         for coupling in self.couplings.values():
             stored += coupling.stiffness * (angle[coupling.a] - angle[coupling.b]) ** 2 / 2
         return stored

@@ -59,8 +59,8 @@ def figure_9_inputs() -> Mapping[str, Signal]:
 def figure_9_start(plant: Actuator) -> Mapping[str, float]:
     """The static equilibrium of the preload without friction."""
     pair, spring, stiffness = plant.gear.meshes["mesh"].pair, plant.load.stiffness, 2e8
-    force = PRELOAD / (pair.radius_a * math.cos(pair.pressure_angle))
-    angle_b = -force * pair.radius_b * math.cos(pair.pressure_angle) / spring
+    force = PRELOAD / (pair.radius_a * math.cos(pair.working_angle))
+    angle_b = -force * pair.radius_b * math.cos(pair.working_angle) / spring
     return {
         "wheel_a.angle": (force / stiffness - pair.radius_b * angle_b) / pair.radius_a,
         "wheel_b.angle": angle_b,

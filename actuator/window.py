@@ -26,7 +26,7 @@ LOG_SLOTS = 4  # events of one output interval that are kept
 MODE_BASE = 5  # mode variables are -2..2
 MODES_PER_CODE = 20  # 5^20 < 2^53
 EVENT_TOLERANCE = 1e-14  # part of a window
-MAX_EVENTS = 20_000  # in one window
+MAX_EVENTS = 500  # in one window; with more it is run again in halves, and is chattering if that does not help
 
 
 class ModeCode:

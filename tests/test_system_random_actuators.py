@@ -9,11 +9,14 @@ import pytest
 from random_actuators import draw
 
 from actuator import simulate
+from actuator.hybrid import MARGIN_BAND
 from actuator.run import STUCK
+from gear.mesh import MESH_SPEED_NOMINAL
+from gear.transmission import BEARING_SPEED_NOMINAL
 
 ACTUATORS = 200
 SHORT, FULL = 0.3, 2.0  # s simulated in every test run, and where asked for with `-m slow`
-ROUNDING = 1e-12  # part of the largest loss of a contact
+ROUNDING = 1e-9  # of a margin; for a sliding contact that is a part of its usual speed
 # margins of up to -1e-6 on output points, and a joint decision that was not found, all of them late
 FAILED_ONCE = (7, 20, 21, 33, 71, 83, 88, 92, 111, 147, 149, 151, 160)
 
@@ -22,14 +25,15 @@ def check(seed, duration):
     actuator, inputs, stick_by = draw(seed, duration)
     run = simulate(actuator, duration, inputs=inputs, compiled=False, resolution=1e-3 * duration)
     assert run.t[-1] == duration
-    assert run.margins.min() >= -1e-9, run.system.margin_names[int(run.margins.min(axis=1).argmin())]
+    assert run.margins.min() >= -ROUNDING, run.system.margin_names[int(run.margins.min(axis=1).argmin())]
     for contact, modes in run.modes.items():
         stuck = modes == STUCK
         assert abs(run[f"{contact}.slip_speed"][stuck]).max(initial=0.0) < 1e-9, contact
         sliding_loss = np.where(stuck, 0.0, run[f"{contact}.friction_loss"])
         assert np.trapezoid(sliding_loss, run.t) >= 0, contact
         if stick_by == "conjugate speed" or "bearings" in contact:
-            assert sliding_loss.min() >= -ROUNDING * sliding_loss.max(), contact
+            speed = BEARING_SPEED_NOMINAL if "bearings" in contact else MESH_SPEED_NOMINAL
+            assert (sliding_loss >= -(ROUNDING + MARGIN_BAND) * speed * abs(run[f"{contact}.friction"])).all(), contact
 
 
 @pytest.mark.parametrize("seed", range(ACTUATORS))

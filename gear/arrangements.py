@@ -2,11 +2,12 @@
 
 Each function is a few lines that name the shafts and say what meshes with what; nothing in the rest of the
 project knows these sets. Planets are lumped by count into one shaft: its inertia is that of all of them,
-its meshes share their load (`Mesh.count`), and their masses ride on the carrier.
+its meshes share their load (`Mesh.count`), and their masses ride on the carrier. `separate` takes them apart again,
+where they are not equal or their load is not.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
 from annotated_types import Ge, Unit
@@ -16,7 +17,7 @@ from gear.friction import FrictionLaws
 from gear.geometry import ExternalPair, GivenPair
 from gear.internal import InternalPair
 from gear.mesh import Mesh
-from gear.quantities import Inertia, check
+from gear.quantities import Inertia, check, check_count
 from gear.shafts import Bearing, Shaft
 from gear.transmission import Transmission
 
@@ -73,8 +74,7 @@ class Planets:
 
     def __post_init__(self) -> None:
         check(self)
-        if isinstance(self.count, bool) or not isinstance(self.count, int) or self.count < 1:
-            raise ValueError(f"Planets.count must be a whole number >= 1, got {self.count!r}")
+        check_count(self, "count")
 
     def shaft(self) -> Shaft:
         """All planets as one shaft."""
@@ -322,6 +322,60 @@ def differential(  # noqa: PLR0913 - as many as the set has parts
         output=output,
         fixed=fixed,
     )
+
+
+def separate(gear: Transmission, *shafts: str) -> Transmission:
+    """The same set with a shaft and meshes of its own for every planet, so that they can differ.
+
+    Shaft planets becomes planets_1, planets_2, ..., its mesh sun_planet becomes sun_planet_1, sun_planet_2, ...;
+    change one with `dataclasses.replace` (another gap, stiffness, transmission error) and the load is shared unequally.
+    More meshes can then stick than shafts can move: their friction is the smallest that holds, see `gear.stiction`.
+
+    Parameters
+    ----------
+    gear : Transmission
+        Of this module, with lumped planets and nothing but meshes on them.
+    shafts : str
+        Names of the planets' shafts; both of sets with short and long planets.
+
+    Raises
+    ------
+    ValueError
+        Where a shaft is not that of several planets, or carries more than meshes.
+    """
+    counts = {name: {mesh.count for mesh in gear.meshes.values() if name in (mesh.a, mesh.b)} for name in shafts}
+    found = set().union(*counts.values())
+    if len(found) != 1 or min(found) == 1 or not all(counts.values()):
+        raise ValueError(
+            f"separate: shafts {', '.join(shafts)} must be those of equally many lumped planets, got meshes with count "
+            f"{', '.join(map(str, sorted(found))) or 'none'}"
+        )
+    loaded = [
+        f"{kind}.{name}"
+        for kind in ("bearings", "couplings", "drags")
+        for name, part in getattr(gear, kind).items()
+        if {getattr(part, end, None) for end in ("shaft", "a", "b")} & set(shafts)
+    ]
+    if loaded:
+        raise ValueError(f"separate: {loaded[0]} is that of all planets together; add it to the separate ones instead")
+    numbers = range(1, found.pop() + 1)
+
+    def own(name: str, k: int) -> str:
+        return f"{name}_{k}" if name in shafts else name
+
+    apart: dict[str, Shaft] = {}
+    for name, shaft in gear.shafts.items():
+        share = shaft.inertia / len(numbers)
+        apart |= {own(name, k): Shaft(inertia=share) for k in numbers} if name in shafts else {name: shaft}
+    meshes: dict[str, Mesh] = {}
+    for name, mesh in gear.meshes.items():
+        split = not {mesh.a, mesh.b}.isdisjoint(shafts)
+        meshes |= (
+            {f"{name}_{k}": replace(mesh, a=own(mesh.a, k), b=own(mesh.b, k), count=1) for k in numbers}
+            if split
+            else {name: mesh}
+        )
+    return replace(gear, shafts=apart, meshes=meshes)
 
 
 def _same_centers(pairs: Mapping[str, ExternalPair | InternalPair]) -> float:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from gear.elastic_law import DEFLECTION_NOMINAL
+from gear.elastic_law import DEFLECTION_NOMINAL, pushing
 from gear.linear import Linear
 from gear.motion import MeshMotion
 from gear.progressive import ProgressiveISO, ProgressiveNiemann
@@ -53,10 +53,7 @@ class Backlash:
         where no run comes, so that a search for an operating point finds its way back to contact.
         """
         penetration = self.penetration(motion, flank)
-        spring = self.law.spring(penetration)
-        limit = ca.fabs(spring)
-        damper = self.law.damper(penetration, flank * motion.rate)
-        return flank * (spring + ca.fmax(-limit, ca.fmin(limit, damper)))
+        return flank * pushing(self.law.spring(penetration), self.law.damper(penetration, flank * motion.rate))
 
     def stored(self, motion: MeshMotion, flank: Scalar) -> Scalar:
         """Integral of the elastic force over the deflection [J]."""

@@ -1,15 +1,13 @@
 """Friction by DIN 3990-4: a film of oil between rough teeth."""
 
-import math
 from dataclasses import dataclass
 
 import casadi as ca
 
-from gear.geometry import ExternalPair, GivenPair
-from gear.internal import InternalPair
+from gear.geometry import Pair
 from gear.lubricant import Lubricants
 from gear.motion import Sliding
-from gear.quantities import HelixAngle, Length, PositiveCoefficient, Scalar, Share, check
+from gear.quantities import Length, PositiveCoefficient, Scalar, Share, check
 
 FORCE_FLOOR = 1e-3  # N; below it the coefficient is constant, as its slope over the force is infinite at zero
 SI = 1e-3  # the bracket with N/mm, um, mPa s, m/s, mm over the one with N/m, m, Pa s, m/s, m: 1e-3 1e6 / (1e3 1e3)
@@ -38,8 +36,6 @@ class Din3990:
     ----------
     static : float
         Coefficient at standstill and cap [-].
-    pair : ExternalPair, InternalPair or GivenPair
-        Radii and pressure angle; the pair of the mesh.
     lubricant : GivenViscosity or OilAt
         Viscosity, or an oil at a temperature.
     roughness : float
@@ -48,8 +44,6 @@ class Din3990:
         [m].
     effective_width : float
         Part of the face width that carries [-].
-    base_helix_angle : float or None
-        beta_b [rad]; None for that of the pair, zero for a GivenPair.
 
     References
     ----------
@@ -58,40 +52,40 @@ class Din3990:
     """
 
     static: PositiveCoefficient
-    pair: ExternalPair | InternalPair | GivenPair
     lubricant: Lubricants
     roughness: Length
     face_width: Length
     effective_width: Share = 1.0
-    base_helix_angle: HelixAngle | None = None
 
     def __post_init__(self) -> None:
         check(self)
-        radius = self.reduced_radius()
-        if not (radius > 0 and math.isfinite(radius)):
+
+    def require_pair(self, pair: Pair) -> None:
+        """Raise ValueError where a pair has no radius of curvature, such as a thread."""
+        a, b = pair.radius_a, pair.radius_b
+        if a * b * (a + b) <= 0:
             raise ValueError(
-                f"Din3990.pair needs a positive reduced radius, got radius_a={self.pair.radius_a:g} m and "
-                f"radius_b={self.pair.radius_b:g} m"
+                f"Din3990 is for teeth that roll on each other, got {type(pair).__name__} with radius_a={a:.6g} m and "
+                f"radius_b={b:.6g} m; use a law over speed, such as Stribeck"
             )
 
-    def reduced_radius(self) -> Scalar:
-        """Reduced radius of curvature at the pitch point, rho_redC [m]."""
-        a, b, helix = self.pair.radius_a, self.pair.radius_b, self.base_helix_angle
-        if helix is None:
-            helix = 0.0 if isinstance(self.pair, GivenPair) else self.pair.gearing.base_helix_angle
-        return a * b / (a + b) * ca.sin(self.pair.working_angle) / ca.cos(helix)
-
-    def cap_speed(self, force: Scalar) -> Scalar:
+    def cap_speed(self, force: Scalar, pair: Pair) -> Scalar:
         """Mesh speed [m/s] below which the formula would exceed `static`, at a normal force [N]."""
         line_load = ca.fmax(force, FORCE_FLOOR) / (self.effective_width * self.face_width)
-        film = self.lubricant.dynamic_viscosity() * self.reduced_radius() * 2 * ca.sin(self.pair.working_angle)
+        film = self.lubricant.dynamic_viscosity() * reduced_radius(pair) * 2 * ca.sin(pair.working_angle)
         return SI * line_load * self.roughness / film * (0.12 / self.static) ** 4
 
     def coefficient(self, sliding: Sliding) -> Scalar:
         """Sliding coefficient [-]; falls with speed and viscosity, rises with the normal force."""
-        cap = self.cap_speed(sliding.force)
+        cap = self.cap_speed(sliding.force, sliding.pair)
         return self.static * (cap / ca.fmax(sliding.speed, cap)) ** 0.25
 
     def breakaway(self, sliding: Sliding) -> Scalar:
         """Coefficient [-] that holds the mesh at rest."""
         return self.static
+
+
+def reduced_radius(pair: Pair) -> Scalar:
+    """Reduced radius of curvature of a pair at the pitch point, rho_redC [m]."""
+    a, b = pair.radius_a, pair.radius_b
+    return a * b / (a + b) * ca.sin(pair.working_angle) / ca.cos(pair.base_helix_angle)

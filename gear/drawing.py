@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from gear.efficiency import balance
 from gear.geometry import GivenPair
 from gear.mesh import Mesh
+from gear.screw import ScrewPair
 from gear.transmission import Transmission
 
 if TYPE_CHECKING:
@@ -50,7 +51,9 @@ def table(gear: Transmission, *, output_torque: float = -1.0, output_speed: floa
 def teeth(mesh: Mesh) -> str:
     """Numbers of teeth of a mesh, or its radii where it has none; with the number of equal ones."""
     pair = mesh.pair
-    if not isinstance(pair, GivenPair):
+    if isinstance(pair, ScrewPair):
+        text = f"screw of lead {1e3 * pair.lead:.4g} mm"
+    elif not isinstance(pair, GivenPair):
         text = f"{pair.teeth_a} : {pair.teeth_b}"
     else:
         text = f"{1e3 * pair.radius_a:.4g} : {1e3 * pair.radius_b:.4g} mm"
@@ -84,6 +87,8 @@ def draw(gear: Transmission, *, output_torque: float = -1.0, output_speed: float
     for name, mesh in gear.meshes.items():
         _draw_mesh(axes, places, mesh, name)
     for coupling in gear.couplings.values():
+        if coupling.b is None:
+            continue
         (x0, y0), (x1, y1) = places[coupling.a], places[coupling.b]
         axes.plot([x0, x1], [y0, y1], color="#4d4d4d", linestyle="--", zorder=1)
     outside = {gear.input: found.input_torque, gear.output: output_torque}
@@ -129,7 +134,8 @@ def _draw_mesh(axes: "Axes", places: dict[str, tuple[float, float]], mesh: Mesh,
 
 def _layout(gear: Transmission) -> dict[str, tuple[float, float]]:
     """Columns by distance from the input through meshes and couplings, carriers on a row of their own below."""
-    joined = [(mesh.a, mesh.b) for mesh in gear.meshes.values()] + [(c.a, c.b) for c in gear.couplings.values()]
+    joined = [(mesh.a, mesh.b) for mesh in gear.meshes.values()]
+    joined += [(c.a, c.b) for c in gear.couplings.values() if c.b is not None]
     carriers = {mesh.carrier for mesh in gear.meshes.values() if mesh.carrier}
     start = gear.input if gear.input not in carriers else next(a for a, _ in joined)
     column, front = {start: 0}, [start]

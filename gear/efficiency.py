@@ -18,6 +18,7 @@ ITERATIONS = 200  # of the normal forces, whose friction depends on their size
 SETTLED = 1e-13  # relative change of the normal forces
 NO_LOAD = 1e-9  # part of a load that is none
 HARDEST = 1e6  # factor on all friction beyond which nothing locks it
+STILL = 1e-9  # part of the speed of the output that is no twist of a coupling
 
 
 class NoSteadyState(ValueError):
@@ -67,6 +68,9 @@ def balance(
 
         sum of meshes (torque_per_normal F_n + torque_per_friction sign(v) mu |F_n|) + outside - bearings = 0
 
+    Where meshes work side by side, such as those of separate planets, this leaves their shares open; the smallest
+    normal forces are taken. What springs and gaps make of it, a run shows.
+
     Parameters
     ----------
     gear : Transmission
@@ -97,21 +101,26 @@ def balance(
         loss[f"drags.{name}"] = -resisting * speeds[drag.shaft]
     columns = [np.array([float(m.torque_per_normal().get(s, 0.0)) for s in shafts]) for m in gear.meshes.values()]
     rubs = [np.array([float(m.torque_per_friction().get(s, 0.0)) for s in shafts]) for m in gear.meshes.values()]
+    rows = [coupling.twist_per_shaft() for coupling in gear.couplings.values()]
+    # a coupling passes what torque it must; a return spring, whose twist grows, has none that is steady
+    passing = [row for row in rows if abs(sum(c * speeds[s] for s, c in row.items())) <= STILL * abs(output_speed)]
+    passed = [np.array([row.get(s, 0.0) for s in shafts]) for row in passing]
     drive = np.array([1.0 if name == gear.input else 0.0 for name in shafts])
     forces, scalars = np.zeros(len(columns)), np.zeros(len(columns))
     for _ in range(ITERATIONS):
         ratios = np.array(
             [_friction_ratio(m, speeds, f, friction) for m, f in zip(gear.meshes.values(), forces, strict=True)]
         )
-        matrix = np.column_stack([*(c + k * b for c, k, b in zip(columns, ratios, rubs, strict=True)), drive])
+        matrix = np.column_stack([*(c + k * b for c, k, b in zip(columns, ratios, rubs, strict=True)), *passed, drive])
         opposing = _bearing_torques(gear, speeds, dict(zip(gear.meshes, forces, strict=True)), friction)
         held = dict.fromkeys(shafts, 0.0)
         for name, bearing in gear.bearings.items():
             held[bearing.shaft] = held.get(bearing.shaft, 0.0) + opposing[name]
         right = np.array([held[name] - outside[name] for name in shafts])
         solved, *_ = np.linalg.lstsq(matrix, right, rcond=None)
-        change = abs(solved[:-1] - forces).max(initial=0.0)
-        forces, scalars = solved[:-1], ratios * solved[:-1]
+        meshing = solved[: len(columns)]
+        change = abs(meshing - forces).max(initial=0.0)
+        forces, scalars = meshing, ratios * meshing
         if change <= SETTLED * max(abs(forces).max(initial=0.0), 1e-300):
             break
     else:
@@ -136,10 +145,11 @@ def _bearing_torques(
     """Torque of each bearing against the motion of its shaft [N m]; viscous drag only while turning."""
     found = {}
     for name, bearing in gear.bearings.items():
-        speed = speeds[bearing.shaft]
-        level = bearing.coulomb if kind == "sliding" else bearing.breakaway
-        level += bearing.load_arm * float(gear.bearing_load(bearing, normal))
-        found[name] = float(np.sign(speed)) * level + (bearing.viscous * speed if kind == "sliding" else 0.0)
+        speed, load = speeds[bearing.shaft], float(gear.bearing_load(bearing, normal))
+        if kind == "sliding":
+            found[name] = np.sign(speed) * bearing.sliding(load, abs(speed)) - bearing.viscous_torque(speed)
+        else:
+            found[name] = np.sign(speed) * bearing.holding(load)
     return found
 
 
@@ -153,7 +163,11 @@ def _friction_ratio(mesh: Mesh, speeds: Mapping[str, float], force: float, kind:
     flank = -1.0 if force < 0 else 1.0
     mesh_speed = abs(mesh.motion(speeds, speeds).speed)
     sliding = Sliding(
-        speed=mesh_speed, force=abs(force) / mesh.count, a_drives=1.0 if slip * flank > 0 else 0.0, position=0.0
+        speed=mesh_speed,
+        force=abs(force) / mesh.count,
+        a_drives=1.0 if slip * flank > 0 else 0.0,
+        position=0.0,
+        pair=mesh.pair,
     )
     law = mesh.friction.coefficient if kind == "sliding" else mesh.friction.breakaway
     return float(np.sign(slip) * law(sliding) * flank)
@@ -281,7 +295,7 @@ def _safe(gives: Callable[[float], float], scale: float) -> float:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Scaled:
+class _Scaled:
     """A friction law with all its coefficients multiplied by a factor."""
 
     law: object
@@ -299,7 +313,7 @@ class Scaled:
 def scaled(gear: Transmission, factor: float) -> Transmission:
     """The same transmission with all mesh friction multiplied by a factor."""
     meshes = {
-        name: mesh if mesh.friction is None else replace(mesh, friction=Scaled(law=mesh.friction, factor=factor))
+        name: mesh if mesh.friction is None else replace(mesh, friction=_Scaled(law=mesh.friction, factor=factor))
         for name, mesh in gear.meshes.items()
     }
     return replace(gear, meshes=meshes)
@@ -313,7 +327,7 @@ def efficiency_map(
     Parameters
     ----------
     gears : Transmission, or mapping of temperature [K] to Transmission
-        Build each with the friction laws of its temperature.
+        Such as {T: at_temperature(gear, T) for T in (218.15, 293.15, 343.15)}, see `gear.at_temperature`.
     torques, speeds : sequence of float
         At the output [N m], [rad/s].
 

@@ -3,11 +3,15 @@
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
+import casadi as ca
+
 from gear.motion import MeshMotion
 from gear.quantities import Scalar
 
 DEFLECTION_NOMINAL = 1e-6  # m; teeth under load bend by about a micrometer
-AT_REST = MeshMotion(*(0.0 for _ in MeshMotion._fields))
+AT_REST = MeshMotion(
+    deflection=0.0, rate=0.0, position=0.0, speed=0.0, turn_a=0.0, turn_b=0.0, speed_a=0.0, speed_b=0.0
+)
 
 
 class ToothSpring(Protocol):
@@ -52,6 +56,12 @@ class ElasticityLaw(Protocol):
     def nominal_force(self) -> Scalar:
         """Size of a usual normal force [N], for scaling."""
         ...
+
+
+def pushing(spring: Scalar, damper: Scalar) -> Scalar:
+    """Force of a contact that cannot pull: the damping is limited to the size of the spring force."""
+    limit = ca.fabs(spring)
+    return spring + ca.fmax(-limit, ca.fmin(limit, damper))
 
 
 def has_gap(law: ElasticityLaw) -> bool:

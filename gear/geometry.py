@@ -6,16 +6,16 @@ from functools import cached_property
 from typing import Protocol
 
 from gear.involute import Gearing, Path, Rack, Teeth, gearing
-from gear.quantities import Arm, Factor, HelixAngle, Length, Number, PressureAngle, Scalar, check
+from gear.quantities import Arm, Factor, HelixAngle, Length, Number, PressureAngle, Scalar, check, show
 from gear.tooth_checks import require_possible, require_teeth
 
 
 class Pair(Protocol):
     """What a mesh asks of a gear pair, however the numbers were obtained.
 
-    Working pitch radii [m] (a ring gear B has a negative one), working pressure angle [rad], and the averaged
-    constants of the friction: the lever arms `friction_arm_a`, `friction_arm_b` [m] on the wheels and the
-    `friction_factor` [-] on the bearings.
+    Working pitch radii [m] (a ring gear B has a negative one), working pressure angle and base helix angle [rad],
+    and the averaged constants of the friction: the lever arms `friction_arm_a`, `friction_arm_b` [m] on the wheels
+    and the `friction_factor` [-] on the bearings.
     """
 
     @property
@@ -31,6 +31,16 @@ class Pair(Protocol):
     @property
     def working_angle(self) -> Scalar:
         """Working transverse pressure angle [rad]."""
+        ...
+
+    @property
+    def base_helix_angle(self) -> Scalar:
+        """Helix angle at the base cylinders, beta_b [rad]."""
+        ...
+
+    @property
+    def tooth_pitch(self) -> Scalar | None:
+        """Feed from tooth to tooth on the working pitch circles [m]; None where the teeth are not known."""
         ...
 
     @property
@@ -133,6 +143,16 @@ class ExternalPair:
         return self.gearing.angle
 
     @property
+    def base_helix_angle(self) -> Scalar:
+        """Helix angle at the base cylinders, beta_b [rad]."""
+        return self.gearing.base_helix_angle
+
+    @property
+    def tooth_pitch(self) -> Scalar:
+        """Feed from tooth to tooth on the working pitch circles [m]."""
+        return self.gearing.pitch
+
+    @property
     def friction_factor(self) -> Scalar:
         """Averaged friction force on the bearings per unit of friction scalar, d_F [-]."""
         return self.path().friction_factor
@@ -166,24 +186,35 @@ class GivenPair:
     Parameters
     ----------
     radius_a, radius_b : float
-        Pitch radii [m].
+        Pitch radii [m]; that of a ring gear B is negative and the larger one.
     pressure_angle : float
         Working pressure angle [rad].
     friction_factor : float
         d_F [-].
     friction_arm_a, friction_arm_b : float
-        -d_tauA and d_tauB [m].
+        -d_tauA and d_tauB [m], the latter with the signs of `gear.internal.InternalPair` where B is a ring.
+    base_helix_angle : float
+        beta_b [rad], which friction laws may ask for; 0 for spur teeth.
+    tooth_pitch : float or None
+        Feed from tooth to tooth on the pitch circles [m], which periodic laws ask for.
     """
 
     radius_a: Length
-    radius_b: Length
+    radius_b: Arm
     friction_arm_a: Arm
     friction_arm_b: Arm
     friction_factor: Number = 0.0
     pressure_angle: PressureAngle = math.radians(20.0)
+    base_helix_angle: HelixAngle = 0.0
+    tooth_pitch: Length | None = None
 
     def __post_init__(self) -> None:
         check(self)
+        if -self.radius_a <= self.radius_b <= 0:
+            raise ValueError(
+                "GivenPair.radius_b must be > 0 m, or for a ring < -radius_a = "
+                f"{show(-self.radius_a, 'm')}, got {show(self.radius_b, 'm')}"
+            )
 
     @property
     def working_angle(self) -> Scalar:

@@ -104,6 +104,16 @@ class InternalPair:
         return self.gearing.angle
 
     @property
+    def base_helix_angle(self) -> Scalar:
+        """Helix angle at the base cylinders, beta_b [rad]."""
+        return self.gearing.base_helix_angle
+
+    @property
+    def tooth_pitch(self) -> Scalar:
+        """Feed from tooth to tooth on the working pitch circles [m]."""
+        return self.gearing.pitch
+
+    @property
     def friction_factor(self) -> Scalar:
         """Averaged friction force on the bearings per unit of friction scalar, d_F [-]."""
         return self.path().friction_factor

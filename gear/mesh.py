@@ -7,11 +7,12 @@ from typing import Literal, NamedTuple
 import casadi as ca
 
 from gear.elasticity import ElasticityLaw, ElasticityLaws, as_law
-from gear.friction import FrictionLaws
+from gear.friction import FrictionLaws, require_suited
 from gear.geometry import ExternalPair, GivenPair
 from gear.internal import InternalPair
 from gear.motion import MeshMotion
-from gear.quantities import Scalar
+from gear.quantities import Scalar, check_count, show
+from gear.screw import ScrewPair
 
 MESH_SPEED_NOMINAL = 1e-2  # m/s
 
@@ -49,7 +50,7 @@ class Mesh:
         Names of the shafts of wheel A and wheel B.
     carrier : str or None
         Name of the shaft that carries the line of centers; None for the housing.
-    pair : ExternalPair, InternalPair or GivenPair
+    pair : ExternalPair, InternalPair, GivenPair or ScrewPair
         Radii and averaged friction arms.
     elasticity : Linear, Backlash, TransmissionError, ... or None
         Normal force from deflection and its rate; None for rigid teeth, a constraint.
@@ -70,7 +71,7 @@ class Mesh:
     a: str
     b: str
     carrier: str | None = None
-    pair: ExternalPair | InternalPair | GivenPair
+    pair: ExternalPair | InternalPair | GivenPair | ScrewPair
     elasticity: ElasticityLaws | None = None
     friction: FrictionLaws | None = None
     count: int = 1
@@ -85,10 +86,21 @@ class Mesh:
             raise ValueError(
                 "Mesh.friction needs the normal force of an elasticity; give one, or leave the friction out"
             )
-        if isinstance(self.count, bool) or not isinstance(self.count, int) or self.count < 1:
-            raise ValueError(f"Mesh.count must be a whole number >= 1, got {self.count!r}")
+        if self.friction is not None and self._sliding() == 0:
+            raise ValueError(
+                "Mesh.friction cannot act: with friction arms of "
+                f"{show(self.pair.friction_arm_a, 'm')} and {show(self.pair.friction_arm_b, 'm')} its pair does not "
+                "slide as it rolls; give it other arms, or leave the friction out"
+            )
+        require_suited(self.friction, self.pair)
+        require_suited(self.elasticity, self.pair)
+        check_count(self, "count")
         if self.stick_by not in ("mesh speed", "conjugate speed"):
             raise ValueError(f'Mesh.stick_by must be "mesh speed" or "conjugate speed", got {self.stick_by!r}')
+        if isinstance(self.pair, ScrewPair) and self.stick_by == "mesh speed":
+            raise ValueError(
+                'Mesh.stick_by must be "conjugate speed" for a ScrewPair, got "mesh speed"; it rubs along its slope'
+            )
 
     @property
     def rigid(self) -> bool:
@@ -116,6 +128,7 @@ class Mesh:
             turn_b=turn_b,
             speed_a=speed_a,
             speed_b=speed_b,
+            pair=self.pair,
         )
 
     def _per_shaft(self, a: Scalar, b: Scalar) -> dict[str, Scalar]:
@@ -131,6 +144,14 @@ class Mesh:
         if self.stick_by == "conjugate speed":
             return self._per_shaft(self.pair.friction_arm_a, -self.pair.friction_arm_b)
         return self._per_shaft(self.pair.radius_a / 2, -self.pair.radius_b / 2)
+
+    def _sliding(self) -> Scalar:
+        """Conjugate speed per mesh speed [-] of wheels that roll together: the mean sliding of their teeth."""
+        return self.pair.friction_arm_a / self.pair.radius_a + self.pair.friction_arm_b / self.pair.radius_b
+
+    def speed_per_slip(self) -> Scalar:
+        """Mesh speed per slip speed [-] of wheels that roll together, for laws of friction over the mesh speed."""
+        return 1 / ca.fabs(self._sliding()) if self.stick_by == "conjugate speed" else 1.0
 
     def torque_per_normal(self) -> dict[str, Scalar]:
         """Torque [N m] on each shaft per normal force [N]: the base radii, T_A = -F_n l_A, T_B = -F_n l_B."""

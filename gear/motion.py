@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+from gear.geometry import Pair
 from gear.quantities import Scalar
 
 
@@ -16,6 +17,7 @@ class MeshMotion(NamedTuple):
     turn_b: Scalar  # angle of wheel B relative to the carrier [rad]
     speed_a: Scalar  # its time derivative [rad/s]
     speed_b: Scalar  # its time derivative [rad/s]
+    pair: Pair | None = None  # the teeth, of a mesh
 
 
 class Sliding(NamedTuple):
@@ -25,3 +27,4 @@ class Sliding(NamedTuple):
     force: Scalar  # normal force [N], >= 0
     a_drives: Scalar  # 1 where wheel A drives, 0 where wheel B does
     position: Scalar  # x_mesh [m]
+    pair: Pair  # the teeth

@@ -1,6 +1,7 @@
 """Lubricating oils: viscosity and density over temperature."""
 
 from dataclasses import dataclass
+from numbers import Real
 
 from gear.quantities import Density, Expansion, Scalar, Temperature, check
 from gear.viscosity import Vogel, Walther
@@ -73,8 +74,8 @@ class Oil:
 
     def require_within(self, temperature: Scalar) -> None:
         """Refuse a number out of the range; an expression has no value yet."""
-        if isinstance(temperature, int | float) and not (
-            self.lowest - ROUNDING <= temperature <= self.highest + ROUNDING
+        if isinstance(temperature, Real) and not (
+            self.lowest - ROUNDING <= float(temperature) <= self.highest + ROUNDING
         ):
             raise ValueError(
                 f"{self.name}: temperature must be from {self.lowest:g} K to {self.highest:g} K, got {temperature:g} K"

@@ -1,40 +1,18 @@
 """Friction that changes with the position of the teeth, on top of any other law."""
 
-import math
 from dataclasses import dataclass
-
-import casadi as ca
 
 from gear.coulomb import Coulomb
 from gear.din3990 import Din3990
-from gear.geometry import ExternalPair
-from gear.internal import InternalPair
+from gear.geometry import Pair
+from gear.harmonics import Harmonic, lowest_factor, pitch_of, tooth_factor
 from gear.motion import Sliding
-from gear.quantities import Length, Number, Scalar, check
+from gear.quantities import Length, Scalar, check
 from gear.tabulated_efficiency import TabulatedEfficiency
 from gear.velocity_friction import FrictionTable, Stribeck
 from gear.viscosity_friction import AtViscosity
 
-SAMPLES = 1000  # of a period, per harmonic; between them the factor is off by less than 5e-6 of its amplitudes
-
 UniformFriction = Coulomb | Din3990 | TabulatedEfficiency | Stribeck | FrictionTable | AtViscosity
-
-
-@dataclass(frozen=True, kw_only=True)
-class Harmonic:
-    """Amplitudes of one harmonic.
-
-    Parameters
-    ----------
-    cosine, sine : float
-        [-], of the mean.
-    """
-
-    cosine: Number = 0.0
-    sine: Number = 0.0
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,10 +29,10 @@ class PeriodicFriction:
     ----------
     law : Coulomb, Din3990, TabulatedEfficiency, Stribeck, FrictionTable or AtViscosity
         The mean over a tooth.
-    pitch : float
-        Feed per tooth on the pitch circles [m].
     harmonics : tuple of Harmonic
         First, second, ... over one tooth. Its numbers stay constants of a model; they are not parameters.
+    pitch : float or None
+        Feed per tooth on the pitch circles [m]; None for that of the pair of the mesh.
 
     Raises
     ------
@@ -67,42 +45,29 @@ class PeriodicFriction:
     """
 
     law: UniformFriction
-    pitch: Length
     harmonics: tuple[Harmonic, ...]
+    pitch: Length | None = None
 
     def __post_init__(self) -> None:
         check(self)
-        count = max(SAMPLES * len(self.harmonics), 1)
-        lowest = min(self.factor(self.pitch * k / count) for k in range(count))
-        # a minimum between two samples lies below both by less than h^2/8 times the largest second derivative
-        bend = sum(
-            (2 * math.pi * k / count) ** 2 * math.hypot(harmonic.cosine, harmonic.sine)
-            for k, harmonic in enumerate(self.harmonics, start=1)
-        )
-        if lowest - bend / 8 <= 0:
+        lowest, slack = lowest_factor(self.harmonics)
+        if lowest - slack <= 0:
             raise ValueError(
                 f"PeriodicFriction.harmonics must leave a factor > 0 everywhere, got {lowest:.4g} at its lowest"
             )
 
-    @classmethod
-    def per_tooth(
-        cls, pair: ExternalPair | InternalPair, law: UniformFriction, harmonics: tuple[Harmonic, ...]
-    ) -> "PeriodicFriction":
-        """With the pitch of a pair."""
-        return cls(law=law, pitch=2 * math.pi * pair.radius_a / pair.teeth_a, harmonics=harmonics)
+    def require_pair(self, pair: Pair) -> None:
+        """Raise ValueError where neither the law nor a pair says the pitch."""
+        pitch_of(self, pair)
 
-    def factor(self, position: Scalar) -> Scalar:
+    def factor(self, position: Scalar, pair: Pair | None = None) -> Scalar:
         """Factor [-] at a feed [m]."""
-        result = 1.0
-        for k, harmonic in enumerate(self.harmonics, start=1):
-            angle = 2 * math.pi * k * position / self.pitch
-            result = result + harmonic.cosine * ca.cos(angle) + harmonic.sine * ca.sin(angle)
-        return result
+        return tooth_factor(self.harmonics, position / pitch_of(self, pair))
 
     def coefficient(self, sliding: Sliding) -> Scalar:
         """Sliding coefficient [-]."""
-        return self.factor(sliding.position) * self.law.coefficient(sliding)
+        return self.factor(sliding.position, sliding.pair) * self.law.coefficient(sliding)
 
     def breakaway(self, sliding: Sliding) -> Scalar:
         """Coefficient [-] that holds the mesh at rest."""
-        return self.factor(sliding.position) * self.law.breakaway(sliding)
+        return self.factor(sliding.position, sliding.pair) * self.law.breakaway(sliding)

@@ -1,19 +1,14 @@
 """Stiffness that changes with the position of the teeth, on top of any other law."""
 
-import math
 from dataclasses import dataclass
-
-import casadi as ca
 
 from gear.backlash import Backlash, BacklashAsPrinted, Teeth
 from gear.elastic_law import as_law
-from gear.geometry import ExternalPair
-from gear.internal import InternalPair
+from gear.geometry import Pair
+from gear.harmonics import Harmonic, lowest_factor, pitch_of, tooth_factor
 from gear.motion import MeshMotion
-from gear.periodic_friction import Harmonic
 from gear.quantities import Length, Scalar, check
 
-SAMPLES = 1000  # of a period, per harmonic; between them the factor is off by less than 5e-6 of its amplitudes
 SOFTEST = 0.01  # factor; teeth in contact are never that soft, and zero would leave them without a force
 
 
@@ -36,10 +31,10 @@ class PeriodicStiffness:
     ----------
     law : Linear, ProgressiveISO, ProgressiveNiemann, Backlash or BacklashAsPrinted
         The mean over a tooth.
-    pitch : float
-        Feed per tooth on the pitch circles [m].
     harmonics : tuple of Harmonic
         First, second, ... over one tooth. Its numbers stay constants of a model; they are not parameters.
+    pitch : float or None
+        Feed per tooth on the pitch circles [m]; None for that of the pair of the mesh.
 
     Raises
     ------
@@ -55,44 +50,33 @@ class PeriodicStiffness:
     """
 
     law: Teeth | Backlash | BacklashAsPrinted
-    pitch: Length
     harmonics: tuple[Harmonic, ...]
+    pitch: Length | None = None
 
     def __post_init__(self) -> None:
         check(self)
-        count = max(SAMPLES * len(self.harmonics), 1)
-        lowest = min(self.factor(self.pitch * k / count) for k in range(count))
+        lowest, _ = lowest_factor(self.harmonics)
         if lowest < SOFTEST:
             raise ValueError(
                 f"PeriodicStiffness.harmonics must leave a factor >= {SOFTEST:g} everywhere, got {lowest:.4g} at its "
                 "lowest; reduce the amplitudes"
             )
 
-    @classmethod
-    def per_tooth(
-        cls,
-        pair: ExternalPair | InternalPair,
-        law: Teeth | Backlash | BacklashAsPrinted,
-        harmonics: tuple[Harmonic, ...],
-    ) -> "PeriodicStiffness":
-        """With the pitch of a pair."""
-        return cls(law=law, pitch=2 * math.pi * pair.radius_a / pair.teeth_a, harmonics=harmonics)
+    def require_pair(self, pair: Pair) -> None:
+        """Raise ValueError where neither the law nor a pair says the pitch."""
+        pitch_of(self, pair)
 
-    def factor(self, position: Scalar) -> Scalar:
+    def factor(self, position: Scalar, pair: Pair | None = None) -> Scalar:
         """Factor [-] at a feed [m]."""
-        result = 1.0
-        for k, harmonic in enumerate(self.harmonics, start=1):
-            angle = 2 * math.pi * k * position / self.pitch
-            result = result + harmonic.cosine * ca.cos(angle) + harmonic.sine * ca.sin(angle)
-        return result
+        return tooth_factor(self.harmonics, position / pitch_of(self, pair))
 
     def force(self, motion: MeshMotion, flank: Scalar) -> Scalar:
         """Normal force [N], positive when A pushes B towards positive travel."""
-        return self.factor(motion.position) * as_law(self.law).force(motion, flank)
+        return self.factor(motion.position, motion.pair) * as_law(self.law).force(motion, flank)
 
     def stored(self, motion: MeshMotion, flank: Scalar) -> Scalar:
         """Integral of the elastic force over the deflection, at the present position [J]."""
-        return self.factor(motion.position) * as_law(self.law).stored(motion, flank)
+        return self.factor(motion.position, motion.pair) * as_law(self.law).stored(motion, flank)
 
     def penetration(self, motion: MeshMotion, flank: Scalar) -> Scalar:
         """How far the teeth are pressed into each other on a flank [m]; None without a gap."""

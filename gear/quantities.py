@@ -7,6 +7,7 @@ when the object is made, the unit in error messages, in files and in reports.
 import math
 import operator
 from dataclasses import fields
+from numbers import Integral, Real
 from typing import Annotated, Any, get_type_hints
 
 from annotated_types import Ge, Gt, Le, Lt, Unit
@@ -20,6 +21,7 @@ Factor = Annotated[float, Unit("-"), Gt(0)]
 Length = Annotated[float, Unit("m"), Gt(0)]
 Distance = Annotated[float, Unit("m"), Ge(0)]
 Arm = Annotated[float, Unit("m")]
+Exponent = Annotated[float, Unit("-"), Ge(0), Le(1)]
 PressureAngle = Annotated[float, Unit("rad"), Gt(0), Lt(math.pi / 4)]
 Inertia = Annotated[float, Unit("kg m^2"), Gt(0)]
 Stiffness = Annotated[float, Unit("N/m"), Gt(0)]
@@ -69,9 +71,9 @@ def unit_of(owner: Any, name: str) -> str | None:
     return units[0] if units else None
 
 
-def show(value: float, unit: str | None) -> str:
+def show(value: Any, unit: str | None) -> str:
     """A value as a person writes it: `0.01 m`, and a pure number without a unit."""
-    text = f"{value:.6g}" if isinstance(value, float) else repr(value)
+    text = str(value) if isinstance(value, Integral) else f"{float(value):.6g}"
     return text if unit in (None, "-") else f"{text} {unit}"
 
 
@@ -89,7 +91,7 @@ def check(owner: Any) -> None:
             continue
         unit = unit_of(owner, field.name)
         where = f"{type(owner).__name__}.{field.name}"
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
             raise ValueError(f"{where} must be a finite number [{unit}], got {value!r}")
         for note in notes:
             if type(note) in RULES:
@@ -99,8 +101,8 @@ def check(owner: Any) -> None:
                     raise ValueError(f"{where} must be {sign} {show(bound, unit)}, got {show(value, unit)}")
 
 
-def check_count(owner: Any, name: str, least: int = 1) -> None:
-    """Hold a field that counts something against its least value.
+def check_count(owner: Any, name: str, least: int = 1, of: str = "") -> None:
+    """Hold a field that counts something (`of` what, for the message) against its least value.
 
     Raises
     ------
@@ -108,5 +110,6 @@ def check_count(owner: Any, name: str, least: int = 1) -> None:
         Naming the class, the field and the value.
     """
     value = getattr(owner, name)
-    if isinstance(value, bool) or not isinstance(value, int) or value < least:
-        raise ValueError(f"{type(owner).__name__}.{name} must be a whole number >= {least}, got {value!r}")
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < least:
+        what = f"a whole number of {of}" if of else "a whole number"
+        raise ValueError(f"{type(owner).__name__}.{name} must be {what} >= {least}, got {value!r}")

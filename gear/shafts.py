@@ -1,9 +1,10 @@
-"""Shafts and what stands beside the meshes: bearings with stiction, flexible couplings."""
+"""Shafts and what brakes them beside the meshes: bearings with stiction, drag."""
 
 from dataclasses import dataclass
 from itertools import pairwise
 
-from gear.quantities import Distance, FrictionTorque, Inertia, Scalar, TorsionalDamping, TorsionalStiffness, check, show
+from gear.oil_drag import Palmgren, Thickening
+from gear.quantities import Distance, FrictionTorque, Inertia, Scalar, TorsionalDamping, check, show
 from gear.tables import piecewise_linear
 
 
@@ -27,8 +28,8 @@ class Shaft:
 class Bearing:
     """Friction between a shaft and the housing: bearing and seal, with stiction.
 
-        torque opposing motion = coulomb + load_arm * load + viscous * |speed|      while turning
-                              <= breakaway + load_arm * load                        at rest
+        opposing torque = coulomb + load_arm * load + film(|speed|) + viscous * thickening * |speed|    while turning
+                       <= breakaway + load_arm * load + film(0)                                         at rest
 
     The load is the sum of the normal forces of the meshes on the shaft.
 
@@ -42,6 +43,10 @@ class Bearing:
         Torque per speed [N m s/rad].
     load_arm : float
         Friction torque per load [m]: friction coefficient times radius of the bearing.
+    thickening : Thickening or None
+        Makes `viscous` depend on the oil; None where it is given for the oil in use.
+    film : Palmgren or None
+        Torque of the oil in a rolling bearing.
     """
 
     shaft: str
@@ -49,6 +54,8 @@ class Bearing:
     breakaway: FrictionTorque
     viscous: TorsionalDamping = 0.0
     load_arm: Distance = 0.0
+    thickening: Thickening | None = None
+    film: Palmgren | None = None
 
     def __post_init__(self) -> None:
         check(self)
@@ -59,39 +66,29 @@ class Bearing:
                 "the sliding one has no consistent motion at standstill"
             )
 
+    def holding(self, load: Scalar) -> Scalar:
+        """Largest torque [N m] that holds the shaft at rest under a load [N]."""
+        return self.breakaway + self.load_arm * load + self._film(0.0)
 
-@dataclass(frozen=True, kw_only=True)
-class Coupling:
-    """Torsional spring and damper between two shafts: a flexible shaft, mounting or surface.
+    def sliding(self, load: Scalar, speed: Scalar) -> Scalar:
+        """Torque against the motion [N m] under a load [N] at a speed >= 0 [rad/s], without `viscous`."""
+        return self.coulomb + self.load_arm * load + self._film(speed)
 
-        torque on b = stiffness (phi_a - phi_b) + damping (phi_a' - phi_b'),   on a the opposite
+    def _film(self, speed: Scalar) -> Scalar:
+        return 0.0 if self.film is None else self.film.torque(speed)
 
-    Parameters
-    ----------
-    a, b : str
-        Names of the shafts it joins.
-    stiffness : float
-        [N m/rad].
-    damping : float
-        [N m s/rad].
-    """
-
-    a: str
-    b: str
-    stiffness: TorsionalStiffness
-    damping: TorsionalDamping
-
-    def __post_init__(self) -> None:
-        check(self)
-        if self.a == self.b:
-            raise ValueError(f"Coupling needs two different shafts, got {self.a!r} twice")
+    def viscous_torque(self, speed: Scalar) -> Scalar:
+        """Torque on the shaft [N m] at a signed speed [rad/s]."""
+        return -self.viscous * (1.0 if self.thickening is None else self.thickening.factor()) * speed
 
 
 @dataclass(frozen=True, kw_only=True)
 class Drag:
     """Torque that opposes motion and vanishes at rest, as a table over speed: windage, churning.
 
-        torque = -sign(speed) * table(|speed|), straight lines between the points, constant beyond the last
+        torque = -sign(speed) * table(|speed|) * thickening
+
+    with straight lines between the points, constant beyond the last.
 
     Parameters
     ----------
@@ -101,11 +98,14 @@ class Drag:
         [rad/s], increasing from 0.
     torques : tuple of float
         [N m], as many, the first 0, none negative.
+    thickening : Thickening or None
+        Makes the torques depend on the oil; None where they are given for the oil in use.
     """
 
     shaft: str
     speeds: tuple[float, ...]
     torques: tuple[float, ...]
+    thickening: Thickening | None = None
 
     def __post_init__(self) -> None:
         where = f"Drag on shaft {self.shaft!r}"
@@ -122,4 +122,4 @@ class Drag:
         """Torque on the shaft [N m] at a signed speed [rad/s]; an odd function, so no sign is taken."""
         mirrored = (*(-value for value in reversed(self.speeds[1:])), *self.speeds)
         odd = (*(-value for value in reversed(self.torques[1:])), *self.torques)
-        return -piecewise_linear(speed, mirrored, odd)
+        return -piecewise_linear(speed, mirrored, odd) * (1.0 if self.thickening is None else self.thickening.factor())

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from gear.geometry import ExternalPair, GivenPair
-from gear.internal import InternalPair
+from gear.geometry import Pair
 from gear.motion import Sliding
 from gear.quantities import AtLeastOne, MeshSpeed, Scalar, Share, check
 from gear.speed_axis import require_axis
@@ -50,8 +49,6 @@ class TabulatedEfficiency:
     ----------
     points : tuple of EfficiencyPoint
         Speeds increase from zero. Its numbers stay constants of a model; they are not parameters.
-    pair : ExternalPair, InternalPair or GivenPair
-        Radii, pressure angle and friction arms; the pair of the mesh.
     breakout : float
         Factor on the friction at standstill, >= 1 [-].
 
@@ -62,13 +59,15 @@ class TabulatedEfficiency:
     """
 
     points: tuple[EfficiencyPoint, ...]
-    pair: ExternalPair | InternalPair | GivenPair
     breakout: AtLeastOne = 1.0
 
     def __post_init__(self) -> None:
         check(self)
         require_axis("TabulatedEfficiency", [point.speed for point in self.points])
-        a, b = self._arms()
+
+    def require_pair(self, pair: Pair) -> None:
+        """Raise ValueError where no friction gives the teeth of a pair an efficiency of the table."""
+        a, b = _arms(pair)
         for k, point in enumerate(self.points):
             for side, arm, other in (("a", b, a), ("b", a, b)):
                 efficiency = getattr(point, f"{side}_drives")
@@ -78,22 +77,23 @@ class TabulatedEfficiency:
                         f"friction arms {a:.4g} r_A and {b:.4g} r_B, more friction does not lower the efficiency"
                     )
 
-    def _arms(self) -> tuple[Scalar, Scalar]:
-        """Friction arms over pitch radii."""
-        return self.pair.friction_arm_a / self.pair.radius_a, self.pair.friction_arm_b / self.pair.radius_b
-
-    def _coefficients(self, speed: Scalar) -> tuple[Scalar, Scalar]:
+    def _coefficients(self, speed: Scalar, pair: Pair) -> tuple[Scalar, Scalar]:
         """Coefficients where A drives and where B does."""
         speeds, a_drives, b_drives = zip(*((p.speed, p.a_drives, p.b_drives) for p in self.points), strict=True)
         eta_a, eta_b = piecewise_linear(speed, speeds, a_drives), piecewise_linear(speed, speeds, b_drives)
-        cosine, (a, b) = ca.cos(self.pair.working_angle), self._arms()
+        cosine, (a, b) = ca.cos(pair.working_angle), _arms(pair)
         return cosine * (1 - eta_a) / (b + eta_a * a), cosine * (1 - eta_b) / (a + eta_b * b)
 
     def coefficient(self, sliding: Sliding) -> Scalar:
         """Sliding coefficient [-] for the side that drives."""
-        a_drives, b_drives = self._coefficients(sliding.speed)
+        a_drives, b_drives = self._coefficients(sliding.speed, sliding.pair)
         return sliding.a_drives * a_drives + (1 - sliding.a_drives) * b_drives
 
     def breakaway(self, sliding: Sliding) -> Scalar:
         """Coefficient [-] that holds the mesh at rest; at rest no side drives."""
-        return self.breakout * ca.fmax(*self._coefficients(0.0))
+        return self.breakout * ca.fmax(*self._coefficients(0.0, sliding.pair))
+
+
+def _arms(pair: Pair) -> tuple[Scalar, Scalar]:
+    """Friction arms over pitch radii."""
+    return pair.friction_arm_a / pair.radius_a, pair.friction_arm_b / pair.radius_b

@@ -4,6 +4,7 @@ import math
 from typing import Any
 
 from gear.involute import LOWEST_ANGLE, Gearing, Rack, Teeth, gearing, involute, working_involute
+from gear.quantities import check_count
 
 UNDERCUT_ALLOWED = 0.01  # modules; the customary limit of 17 teeth at 20 degrees lacks 0.006
 
@@ -11,9 +12,7 @@ UNDERCUT_ALLOWED = 0.01  # modules; the customary limit of 17 teeth at 20 degree
 def require_teeth(owner: Any) -> None:
     """Raise where a number of teeth is not a whole number."""
     for name in ("teeth_a", "teeth_b"):
-        count = getattr(owner, name)
-        if isinstance(count, bool) or not isinstance(count, int) or count < 1:
-            raise ValueError(f"{type(owner).__name__}.{name} must be a whole number of teeth >= 1, got {count!r}")
+        check_count(owner, name, of="teeth")
 
 
 def require_possible(name: str, rack: Rack, a: Teeth, b: Teeth) -> None:

@@ -1,5 +1,6 @@
-"""A transmission: shafts joined by meshes and couplings and carried by bearings."""
+"""A transmission: shafts joined by meshes and couplings, carried by bearings, ended by stops."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -7,11 +8,12 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
+from gear.couplings import Coupling, EndStop, Twist
 from gear.kinematics import Kinematics
 from gear.mesh import MESH_SPEED_NOMINAL, Mesh
 from gear.motion import MeshMotion, Sliding
 from gear.quantities import Scalar
-from gear.shafts import Bearing, Coupling, Drag, Shaft
+from gear.shafts import Bearing, Drag, Shaft
 
 BEARING_SPEED_NOMINAL = 1.0  # rad/s
 RANK = 1e-9  # motion of the output below which it stands still
@@ -39,7 +41,7 @@ class Transmission:
     ----------
     shafts : mapping of str to Shaft
         By name; the order is the order of the states.
-    meshes, couplings, bearings, drags : mapping of str to Mesh, Coupling, Bearing, Drag
+    meshes, couplings, bearings, drags, stops : mapping of str to Mesh, Coupling, Bearing, Drag, EndStop
         By name; they refer to shafts by name.
     input, output : str
         Names of the shafts on which the motor and the load act.
@@ -58,6 +60,7 @@ class Transmission:
     bearings: Mapping[str, Bearing] = field(default_factory=dict)
     couplings: Mapping[str, Coupling] = field(default_factory=dict)
     drags: Mapping[str, Drag] = field(default_factory=dict)
+    stops: Mapping[str, EndStop] = field(default_factory=dict)
     input: str
     output: str
     fixed: tuple[str, ...] = ()
@@ -85,7 +88,7 @@ class Transmission:
 
     def _references(self) -> list[tuple[str, str]]:
         found = []
-        for kind in ("meshes", "couplings", "bearings", "drags"):
+        for kind in ("meshes", "couplings", "bearings", "drags", "stops"):
             for name, part in getattr(self, kind).items():
                 for terminal in ("a", "b", "carrier", "shaft"):
                     shaft = getattr(part, terminal, None)
@@ -96,7 +99,7 @@ class Transmission:
     def _require_connected(self) -> None:
         """Raise where a shaft has no way to the input through meshes and couplings."""
         reached, joined = {self.input}, [set(mesh.deflection_per_shaft()) for mesh in self.meshes.values()]
-        joined += [{coupling.a, coupling.b} for coupling in self.couplings.values()]
+        joined += [set(coupling.twist_per_shaft()) for coupling in self.couplings.values()]
         for _ in self.shafts:
             reached |= set().union(*(group for group in joined if group & reached))
         alone = [name for name in self.shafts if name not in reached]
@@ -136,7 +139,7 @@ class Transmission:
                     {shaft: 1.0},
                     {shaft: -1.0},
                     BEARING_SPEED_NOMINAL,
-                    ca.fmax(bearing.breakaway, BEARING_TORQUE_FLOOR),
+                    ca.fmax(bearing.holding(0.0), BEARING_TORQUE_FLOOR),
                 )
                 for name, bearing in self.bearings.items()
                 if bearing.shaft == shaft
@@ -178,8 +181,12 @@ class Transmission:
     def travel(self) -> dict[str, float]:
         """Turns of every shaft per turn of the output shaft, all teeth and couplings rigid; errors as `ratio`."""
         rigid = [mesh.deflection_per_shaft() for mesh in self.meshes.values()] + [{name: 1.0} for name in self.fixed]
-        rigid += [{coupling.a: 1.0, coupling.b: -1.0} for coupling in self.couplings.values()]
+        rigid += [coupling.twist_per_shaft() for coupling in self.couplings.values() if coupling.b is not None]
         kinematics = Kinematics(list(self.shafts), rigid, rigid, keep=[self.output])
+        if len(kinematics.independent) > 1:  # a mounting stands still; a return spring does not lock
+            mountings = [c for c in self.couplings.values() if c.b is None and c.a not in (self.input, self.output)]
+            rigid += [coupling.twist_per_shaft() for coupling in mountings]
+            kinematics = Kinematics(list(self.shafts), rigid, rigid, keep=[self.output])
         free = kinematics.independent
         turns = {name: float(row.get(free[0], 0.0)) for name, row in kinematics.turns.items()} if free else {}
         if len(free) != 1 or abs(turns[self.output]) < RANK * max(abs(turn) for turn in turns.values()):
@@ -189,6 +196,13 @@ class Transmission:
                 + ("fix a shaft, or join what is loose" if free else "the constraints lock the train")
             )
         return {name: turn / turns[self.output] + 0.0 for name, turn in turns.items()}
+
+    def output_range(self) -> tuple[float, float]:
+        """Angles [rad] of the output between which no end stop is touched, all teeth and couplings rigid."""
+        turns = self.travel() if self.stops else {}
+        reached = [(stop, turns[stop.shaft]) for stop in self.stops.values() if turns[stop.shaft] != 0]
+        ends = [sorted((stop.lower / turn, stop.upper / turn)) for stop, turn in reached]
+        return max((low for low, _ in ends), default=-math.inf), min((high for _, high in ends), default=math.inf)
 
     def _matrix(self, rows: list[dict[str, Scalar]]) -> np.ndarray:
         """Coefficients per shaft as a matrix, each row scaled to one."""
@@ -202,24 +216,40 @@ class Transmission:
     def normal_forces(self, motions: Mapping[str, MeshMotion], flank: Mapping[str, Scalar]) -> dict[str, Scalar]:
         """Signed normal force [N] of each elastic mesh on its present flank, the sum of its `count` equal ones."""
         return {
-            name: self.meshes[name].count * self.meshes[name].law().force(motion, flank[name])
+            name: self.meshes[name].count * self.meshes[name].law().force(motion, flank[f"meshes.{name}"])
             for name, motion in motions.items()
         }
 
-    def torques(self, angle: Mapping, speed: Mapping, normal: Mapping[str, Scalar]) -> dict[str, Scalar]:
-        """Torque on each shaft [N m] from teeth, couplings and viscous drag, without what can stick."""
+    def springs(self) -> dict[str, Coupling | EndStop]:
+        """Couplings and end stops, by path."""
+        couplings = {f"couplings.{name}": coupling for name, coupling in self.couplings.items()}
+        return couplings | {f"stops.{name}": stop for name, stop in self.stops.items()}
+
+    def twists(self, angle: Mapping[str, Scalar], speed: Mapping[str, Scalar]) -> dict[str, Twist]:
+        """Twist of each coupling and end stop, by path."""
+        rows = {path: spring.twist_per_shaft() for path, spring in self.springs().items()}
+        return {
+            path: Twist(*(sum(c * motion[shaft] for shaft, c in row.items()) for motion in (angle, speed)))
+            for path, row in rows.items()
+        }
+
+    def passed_torques(self, twists: Mapping[str, Twist], flank: Mapping[str, Scalar]) -> dict[str, Scalar]:
+        """Torque [N m] that each coupling passes on from a to b, and each end stop to the housing, by path."""
+        return {path: spring.torque(twists[path], flank[path]) for path, spring in self.springs().items()}
+
+    def torques(
+        self, speed: Mapping[str, Scalar], normal: Mapping[str, Scalar], passed: Mapping[str, Scalar]
+    ) -> dict[str, Scalar]:
+        """Torque on each shaft [N m] from teeth, couplings, end stops and viscous drag, without what can stick."""
         torque = dict.fromkeys(self.shafts, 0.0)
         for name, force in normal.items():
             for shaft, arm in self.meshes[name].torque_per_normal().items():
                 torque[shaft] += arm * force
-        for coupling in self.couplings.values():
-            passed = coupling.stiffness * (angle[coupling.a] - angle[coupling.b]) + coupling.damping * (
-                speed[coupling.a] - speed[coupling.b]
-            )
-            torque[coupling.a] -= passed
-            torque[coupling.b] += passed
+        for path, spring in self.springs().items():
+            for shaft, c in spring.twist_per_shaft().items():
+                torque[shaft] -= c * passed[path]
         for bearing in self.bearings.values():
-            torque[bearing.shaft] -= bearing.viscous * speed[bearing.shaft]
+            torque[bearing.shaft] += bearing.viscous_torque(speed[bearing.shaft])
         for drag in self.drags.values():
             torque[drag.shaft] += drag.torque(speed[drag.shaft])
         return torque
@@ -234,17 +264,18 @@ class Transmission:
         """Friction limits of each contact, both >= 0: at rest, and while sliding at `slip` >= 0 in `direction` +-1."""
         limits = {}
         for name, bearing in self.bearings.items():
-            extra = bearing.load_arm * self.bearing_load(bearing, normal)
-            limits[f"bearings.{name}"] = (bearing.breakaway + extra, bearing.coulomb + extra)
+            path, load = f"bearings.{name}", self.bearing_load(bearing, normal)
+            limits[path] = (bearing.holding(load), bearing.sliding(load, slip[path]))
         for name, mesh in self.meshes.items():
             if mesh.friction is None:
                 continue
             path, force = f"meshes.{name}", ca.fabs(normal[name])
             sliding = Sliding(
-                speed=slip[path],
+                speed=slip[path] * mesh.speed_per_slip(),
                 force=force / mesh.count,
                 a_drives=ca.if_else(direction[path] * normal[name] >= 0, 1, 0),
                 position=motions[name].position,
+                pair=mesh.pair,
             )
             limits[path] = (mesh.friction.breakaway(sliding) * force, mesh.friction.coefficient(sliding) * force)
         return limits
@@ -257,7 +288,7 @@ class Transmission:
         )
 
     def elastic_energy(self, motions: Mapping[str, MeshMotion], angle: Mapping, flank: Mapping[str, Scalar]) -> Scalar:
-        """Energy [J] stored in teeth and couplings.
+        """Energy [J] stored in teeth, couplings and end stops.
 
         The deflection is measured on the pitch circle and the force acts along the line of action, so a
         mesh stores cos(alpha) times the integral of its force law.
@@ -265,7 +296,7 @@ class Transmission:
         stored = 0.0
         for name, motion in motions.items():
             mesh = self.meshes[name]
-            stored += ca.cos(mesh.pair.working_angle) * mesh.count * mesh.law().stored(motion, flank[name])
-        for coupling in self.couplings.values():
-            stored += coupling.stiffness * (angle[coupling.a] - angle[coupling.b]) ** 2 / 2
+            stored += ca.cos(mesh.pair.working_angle) * mesh.count * mesh.law().stored(motion, flank[f"meshes.{name}"])
+        for path, twist in self.twists(angle, dict.fromkeys(self.shafts, 0.0)).items():
+            stored += self.springs()[path].stored(twist, flank[path])
         return stored

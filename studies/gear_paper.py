@@ -32,9 +32,10 @@ from gear import (
     elasticity_curves,
 )
 from gear.efficiency import balance, breakout, efficiency
-from gear.motion import MeshMotion, Sliding
+from gear.elastic_law import AT_REST
+from gear.motion import Sliding
 from gear.tabulated_efficiency import EfficiencyPoint
-from studies.paper import PAIRS, figure_9, figure_9_inputs, figure_9_start
+from studies.paper import figure_9, figure_9_inputs, figure_9_start
 
 PAIR = ExternalPair(teeth_a=20, teeth_b=60, module=1e-3)
 FACE_WIDTH = 0.01  # m; the paper gives none
@@ -111,11 +112,10 @@ def niemann() -> ProgressiveNiemann:
     return ProgressiveNiemann(stiffness=CONTACT, nominal_force=1e5 * EFFECTIVE * FACE_WIDTH, damping=0.0)
 
 
-def din(pair: ExternalPair = PAIR) -> Din3990:
+def din() -> Din3990:
     """The paper's friction: DIN 3990-4 with its oil, roughness and effective width."""
     return Din3990(
         static=RIG["static"],
-        pair=pair,
         lubricant=GivenViscosity(viscosity=RIG["viscosity"]),
         roughness=RIG["roughness"],
         face_width=FACE_WIDTH,
@@ -128,7 +128,7 @@ def figure_9_with_din() -> Figures:
     pictures, result = {}, {}
     for arms in ("printed", "geometric"):
         plain = figure_9(arms)
-        mesh = replace(plain.gear.meshes["mesh"], friction=din(PAIRS["geometric"]))
+        mesh = replace(plain.gear.meshes["mesh"], friction=din())
         plant = replace(plain, gear=replace(plain.gear, meshes={"mesh": mesh}), name=f"figure 9, DIN 3990-4, {arms}")
         run = simulate(plant, 10.0, inputs=figure_9_inputs(), start=figure_9_start(plant))
         pictures[f"figure_9_{arms}"] = plot_run(run, ["motor_angle", "load_angle", "gear.meshes.mesh.slip_speed"])
@@ -225,10 +225,12 @@ def figures_12_and_13() -> Figures:
 def _deflection(law: Any, force: float) -> float:
     """Deflection [m] at which an elasticity law gives a force [N]."""
     flank = 1.0 if force >= 0 else -1.0
-    still = [0.0] * (len(MeshMotion._fields) - 1)
     start = RIG["gap"] / 2
     x = brentq(
-        lambda d: float(law.force(MeshMotion(flank * d, *still), flank)) - force, start, start + 1e-3, xtol=1e-15
+        lambda d: float(law.force(AT_REST._replace(deflection=flank * d), flank)) - force,
+        start,
+        start + 1e-3,
+        xtol=1e-15,
     )
     return flank * float(x)  # pyright: ignore[reportArgumentType]
 
@@ -236,9 +238,7 @@ def _deflection(law: Any, force: float) -> float:
 def cold_gearbox() -> Figures:
     """The aerospace sentence: 85 % efficiency and breakout at half the stall load, at -55 degC."""
     stall, speed = 60.0, 1.0  # N m and rad/s at wheel B
-    law = TabulatedEfficiency(
-        points=(EfficiencyPoint(speed=0.0, a_drives=0.85, b_drives=0.85),), pair=PAIR, breakout=1.0
-    )
+    law = TabulatedEfficiency(points=(EfficiencyPoint(speed=0.0, a_drives=0.85, b_drives=0.85),), breakout=1.0)
     mesh = Mesh(a="wheel_a", b="wheel_b", pair=PAIR, elasticity=Linear(stiffness=CONTACT, damping=1e3), friction=law)
     bare = Transmission(
         shafts={"wheel_a": Shaft(inertia=5e-4), "wheel_b": Shaft(inertia=1e-3)},
@@ -253,7 +253,9 @@ def cold_gearbox() -> Figures:
     result = {
         "efficiency_forward": efficiency(bare, torque=stall, speed=speed),
         "efficiency_backward": efficiency(bare, torque=stall, speed=speed, driving="output"),
-        "coefficient_of_friction": float(law.breakaway(Sliding(speed=0.0, force=0.0, a_drives=1.0, position=0.0))),
+        "coefficient_of_friction": float(
+            law.breakaway(Sliding(speed=0.0, force=0.0, a_drives=1.0, position=0.0, pair=PAIR))
+        ),
         "breakout_torque_at_output_Nm": start.output_torque,
         "breakout_over_stall": start.output_torque / stall,
     }

@@ -8,10 +8,11 @@ from gear.quantities import unit_of
 
 
 class Suffix(NamedTuple):
-    """A unit for use in files: how many of it make one SI unit."""
+    """A unit for use in files: how many of it make one SI unit, and where its zero stands in that."""
 
     count: float
     unit: str
+    zero: float = 0.0
 
 
 # counts and not factors: 20 / 1e6 is the same double as 2e-5, 20 * 1e-6 is not
@@ -31,6 +32,9 @@ SUFFIXES = {
     "mohm": Suffix(1e3, "ohm"),
     "mH": Suffix(1e3, "H"),
     "uH": Suffix(1e6, "H"),
+    "degC": Suffix(1.0, "K", 273.15),
+    "mPas": Suffix(1e3, "Pa s"),
+    "mm2_per_s": Suffix(1e6, "m^2/s"),
 }
 
 # of signals, whose values are in the unit of the input they drive
@@ -80,4 +84,4 @@ def to_si(value: Any, suffix: Suffix) -> Any:
     """A number, or each number of a list, in SI; anything else as it is, for the type check to refuse."""
     if isinstance(value, list):
         return [to_si(item, suffix) for item in value]
-    return value / suffix.count if is_number(value) else value
+    return value / suffix.count + suffix.zero if is_number(value) else value

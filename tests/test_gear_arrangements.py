@@ -4,16 +4,32 @@ Oracles: Willis' equation for every ratio; H. W. Mueller, "Epicyclic Drive Train
 the efficiency of a planetary set from that of its train with the carrier at rest; power balance.
 """
 
-import pytest
+import math
+from dataclasses import replace
 
-from actuator import Actuator, Load, Ramp, Sine, Sum, TorqueSource, simulate
-from gear import Bearing, Coulomb, ExternalPair, InternalPair, Linear
+import numpy as np
+import pytest
+from scipy.integrate import cumulative_trapezoid
+from scipy.linalg import null_space
+
+from actuator import Actuator, Load, Sine, TorqueSource, simulate
+from gear import (
+    Backlash,
+    Bearing,
+    Coulomb,
+    ErrorHarmonic,
+    ExternalPair,
+    InternalPair,
+    Linear,
+    TransmissionError,
+)
 from gear.arrangements import (
     MeshLaws,
     Planets,
     differential,
     planetary,
     ravigneaux,
+    separate,
     spur_pair,
     stepped_planetary,
     train,
@@ -21,6 +37,7 @@ from gear.arrangements import (
 )
 from gear.drawing import draw, table
 from gear.efficiency import balance, efficiency
+from studies.paper import compound_planetary, compound_planetary_inputs
 
 LOSSY = MeshLaws(elasticity=Linear(stiffness=1e8, damping=2e4), friction=Coulomb(sliding=0.1, static=0.15))
 LOSSLESS = MeshLaws(elasticity=Linear(stiffness=1e8, damping=2e4))
@@ -169,27 +186,158 @@ def test_rigid_and_stiff_teeth_accelerate_alike():
     assert elastic["motor_speed"][-1] == pytest.approx(run["motor_speed"][-1], rel=1e-4)
 
 
-def test_a_compound_planetary_that_sticks_everywhere_keeps_its_margins():
-    gear = stepped(LOSSY)
-    bearings = {name: Bearing(shaft=name, coulomb=0.005, breakaway=0.01) for name in ("sun", "carrier")}
-    plant = Actuator(
-        motor=TorqueSource(),
-        gear=type(gear)(
-            shafts=gear.shafts, meshes=gear.meshes, bearings=bearings, input="sun", output="carrier", fixed=("ring",)
-        ),
-        load=Load(inertia=1e-3, damping=0.05, stiffness=2.0),
+def test_a_compound_planetary_that_sticks_everywhere_keeps_its_margins_and_creates_no_energy():
+    """Ten seconds back and forth under load: what goes in is stored or becomes heat, and heat only grows."""
+    run = simulate(compound_planetary(), 10.0, inputs=compound_planetary_inputs(), resolution=1e-3, compiled=False)
+    assert run.margins.min() > -1e-9
+    for contact in ("gear.meshes.sun_planet", "gear.meshes.planet_ring", "gear.bearings.sun"):
+        assert {"stuck", "forward", "backward"} <= set(run.modes[contact])
+    power = run["motor_torque"] * run["motor_speed"] + run["total_load_torque"] * run["load_speed"]
+    stored = run["mechanical_energy"] - run["mechanical_energy"][0]
+    lost = cumulative_trapezoid(power, run.t, initial=0.0) - stored
+    assert np.diff(lost).min() > -1e-5 * lost[-1]  # the trapezoidal rule, at a reversal
+    friction = sum(run[f"{contact}.friction_loss"] for contact in run.modes)
+    assert friction.min() > -1e-9
+    assert lost[-1] == pytest.approx(np.trapezoid(friction, run.t), rel=1e-4)  # teeth damp a little, too
+
+
+# -- separate planets ---------------------------------------------------------------------------------
+
+LOAD = Load(inertia=1e-3, damping=0.05, stiffness=2.0)
+TOOTH = 1e8  # N/m, of every mesh but the odd one
+BACK_AND_FORTH = {"torque_reference": Sine(amplitude=0.5, frequency=2.0), "load_torque": 0.2}
+
+
+def run_of(gear, inputs, duration):
+    plant = Actuator(motor=TorqueSource(), gear=gear, load=LOAD)
+    return simulate(plant, duration, inputs=inputs, compiled=False, resolution=1e-3)
+
+
+def separated(laws, **odd):
+    """Three planets of their own, with another elasticity in the meshes named."""
+    gear = separate(simple(laws), "planets")
+    return replace(gear, meshes=gear.meshes | {m: replace(gear.meshes[m], elasticity=law) for m, law in odd.items()})
+
+
+def test_equal_planets_apart_are_the_lumped_ones():
+    lumped, apart = simple(LOSSY), separated(LOSSY)
+    assert apart.ratio() == pytest.approx(lumped.ratio())
+    one, other = (balance(gear, output_torque=-10.0, output_speed=1.0) for gear in (lumped, apart))
+    assert other.input_torque == pytest.approx(one.input_torque, rel=1e-9)
+    assert [other.normal[f"sun_planet_{k}"] for k in (1, 2, 3)] == pytest.approx([one.normal["sun_planet"] / 3] * 3)
+
+
+def test_equal_planets_apart_stick_and_slip_as_the_lumped_ones():
+    lumped, apart = (run_of(gear, BACK_AND_FORTH, 1.0) for gear in (simple(LOSSY), separated(LOSSY)))
+    assert apart["motor_angle"] == pytest.approx(lumped["motor_angle"], abs=1e-6)
+    for name in ("sun_planet", "planet_ring"):
+        times, modes = changes(lumped, name)
+        assert {"stuck", "forward", "backward"} <= set(modes)
+        for k in (1, 2, 3):
+            normal = apart[f"gear.meshes.{name}_{k}.normal_force"]
+            assert 3 * normal == pytest.approx(lumped[f"gear.meshes.{name}.normal_force"], abs=1e-3)
+            assert changes(apart, f"{name}_{k}") == (pytest.approx(times, abs=1e-8), modes)
+
+
+def changes(run, mesh):
+    """Times and modes, as the mesh went through them."""
+    found = [change for change in run.changes if change.contact == f"gear.meshes.{mesh}"]
+    return [change.time for change in found], [change.after for change in found]
+
+
+SOFT = Linear(stiffness=0.3 * TOOTH, damping=2e4)
+GAP = Backlash(gap=2e-7, law=Linear(stiffness=TOOTH, damping=2e4))
+PIN_BEARING = Bearing(shaft="planets", coulomb=0.01, breakaway=0.02)
+PIN = TransmissionError(
+    law=Linear(stiffness=TOOTH, damping=2e4), harmonics={"pin": ErrorHarmonic(wheel="b", order=1, amplitude=1e-7)}
+)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "law", "share"),
+    [
+        ("sun_planet_2", SOFT, lambda bend, turn: 2 / (1 / 0.3 + 1)),
+        ("planet_ring_2", GAP, lambda bend, turn: 1 - 1e-7 / bend),  # the others are bent by half the gap first
+        ("planet_ring_2", PIN, lambda bend, turn: 1 - 1e-7 * math.cos(turn) / bend),  # it stands back on this flank
+    ],
+    ids=["stiffness", "backlash", "position"],
+)
+def test_unequal_planets_share_the_load_by_their_springs(mesh, law, share):
+    """Without friction every planet is two springs in series between sun and ring, and all are bent alike."""
+    gear = separated(LOSSLESS, **{mesh: law})
+    run = run_of(gear, {"torque_reference": 0.5}, 2.0)
+    sun, ring = (
+        np.array([run[f"gear.meshes.{name}_{k}.normal_force"][-1] for k in (1, 2, 3)])
+        for name in ("sun_planet", "planet_ring")
     )
-    run = simulate(
-        plant,
-        1.0,
-        inputs={"torque_reference": Sine(amplitude=0.5, frequency=2.0), "load_torque": Sum(parts=(Ramp(slope=0.5),))},
-        compiled=False,
-    )
+    assert sun == pytest.approx(-ring, rel=1e-5)
+    pair = gear.meshes[mesh].pair
+    assert sun.sum() * gear.meshes["sun_planet_1"].pair.radius_a * math.cos(pair.working_angle) == pytest.approx(0.5)
+    bend = 2 * sun[0] / TOOTH
+    assert sun / sun[0] == pytest.approx([1, share(bend, run["carrier.angle"][-1]), 1], rel=1e-4)
+
+
+@pytest.mark.parametrize(("mesh", "law"), [("sun_planet_2", SOFT), ("planet_ring_2", GAP), ("planet_ring_2", PIN)])
+def test_unequal_planets_keep_their_contact_laws_through_stick_and_slip(mesh, law):
+    gear = separated(LOSSY, **{mesh: law})
+    assert gear.redundant()
+    run = run_of(gear, BACK_AND_FORTH, 1.0)
     assert run.margins.min() > -1e-9
     for contact, modes in run.modes.items():
-        loss = run[f"{contact}.friction_loss"][1:] * (modes[1:] != "stuck")
-        assert (loss * (run.t[1:] - run.t[:-1])).sum() >= 0
-    assert {"stuck", "forward", "backward"} <= set(run.modes["gear.meshes.sun_planet"])
+        assert {"stuck", "forward", "backward"} <= {change.after for change in run.changes if change.contact == contact}
+        assert run[f"{contact}.friction_loss"].min() > -1e-9
+        assert abs(run[f"{contact}.slip_speed"][modes == "stuck"]).max(initial=0.0) < 1e-12
+
+
+def test_six_stuck_meshes_of_five_shafts_share_the_smallest_friction_that_holds():
+    """G s = demand has many solutions; the one with the smallest sum of G_kk s_k^2 is normal to what G cannot see."""
+    gear = separated(LOSSY, sun_planet_2=SOFT)
+    run = run_of(gear, {"torque_reference": 0.5}, 4.0)
+    contacts = [contact.name for contact in gear.contacts()]
+    assert len(contacts) == 6 and all(run.modes[f"gear.{name}"][-1] == "stuck" for name in contacts)
+    free = [name for name in gear.shafts if name not in gear.fixed]
+    slip = np.array([[float(contact.slip.get(name, 0.0)) for name in free] for contact in gear.contacts()])
+    inertia = np.array([gear.shafts[name].inertia + (LOAD.inertia if name == "carrier" else 0.0) for name in free])
+    weights = np.diag(slip / inertia @ slip.T)
+    unseen = null_space(slip.T).T
+    assert len(unseen) == 6 - 4  # turning so that all roll is no slip
+    scalars = np.array([run[f"gear.{name}.friction"][-1] for name in contacts])
+    assert np.linalg.norm(scalars) > 0.1
+    assert unseen @ (weights * scalars) == pytest.approx([0.0, 0.0], abs=1e-6 * np.linalg.norm(weights * scalars))
+    assert abs(np.array([run[f"{name}.speed"][-1] for name in free])).max() < 1e-9  # and nothing creeps
+
+
+def test_planets_of_every_set_can_be_taken_apart():
+    for gear, shafts in (
+        (wolfrom_set(), ["planets"]),
+        (stepped(), ["planets"]),
+        (ravigneaux_set(), ["short_planets", "long_planets"]),
+        (differential_set(fixed=("left_sun",)), ["left_planets", "right_planets"]),
+    ):
+        apart = separate(gear, *shafts)
+        assert apart.ratio() == pytest.approx(gear.ratio(), rel=1e-9)
+        assert len(apart.meshes) == 3 * len(gear.meshes)
+        total = sum(shaft.inertia for shaft in gear.shafts.values())
+        assert sum(shaft.inertia for shaft in apart.shafts.values()) == pytest.approx(total)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (
+            lambda: separate(simple(), "planet"),
+            "must be those of equally many lumped planets, got meshes with count none",
+        ),
+        (lambda: separate(simple(), "planets", "wheel"), "must be those of equally many lumped planets"),
+        (
+            lambda: separate(replace(simple(), bearings={"pin": PIN_BEARING}), "planets"),
+            "separate: bearings.pin is that of all planets together; add it to the separate ones instead",
+        ),
+    ],
+)
+def test_what_cannot_be_taken_apart_is_refused(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
 
 
 def test_the_table_and_the_drawing_name_every_shaft_and_mesh():

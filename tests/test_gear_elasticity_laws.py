@@ -6,6 +6,7 @@ whose deflection must repeat what its wheels were given.
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from gear import (
     BacklashAsPrinted,
     Coulomb,
     ErrorHarmonic,
+    GivenPair,
     Harmonic,
     Linear,
     Mesh,
@@ -89,6 +91,7 @@ motions = st.builds(
     turn_b=numbers(-50.0, 50.0),
     speed_a=numbers(-100.0, 100.0),
     speed_b=numbers(-100.0, 100.0),
+    pair=st.none(),
 )
 few, many = settings(deadline=None, max_examples=20), settings(deadline=None, max_examples=60)
 
@@ -216,7 +219,7 @@ def test_laws_are_the_same_in_numbers_and_in_symbols(law, motion, flank):
     for of in (law.force, law.stored):
         number = of(motion, flank)
         assert isinstance(number, float)
-        symbolic = in_symbols(lambda *x, of=of: of(MeshMotion(*x[:-1]), x[-1]), *motion, flank)
+        symbolic = in_symbols(lambda *x, of=of: of(MeshMotion(*x[:-1]), x[-1]), *motion[:-1], flank)
         assert symbolic == pytest.approx(number, rel=1e-9, abs=1e-9)
 
 
@@ -225,7 +228,7 @@ def test_laws_are_the_same_in_numbers_and_in_symbols(law, motion, flank):
 @given(motion=motions, flank=flanks)
 def test_symbolic_slopes_of_the_force_are_its_difference_quotients(law, motion, flank):
     steps = {"deflection": 1e-9, "rate": 1e-6, "position": 1e-7, "turn_a": 1e-5, "turn_b": 1e-6, "speed_a": 1e-3}
-    slopes = gradient_in_symbols(lambda *x: law.force(MeshMotion(*x), flank), *motion)
+    slopes = gradient_in_symbols(lambda *x: law.force(MeshMotion(*x), flank), *motion[:-1])
     for name, step in steps.items():
 
         def along(value, name=name):
@@ -329,7 +332,42 @@ def test_periodic_stiffness_by_hand():
 
 
 def test_pitch_of_a_pair_is_pi_times_its_module():
-    assert PeriodicStiffness.per_tooth(PAPER_PAIR, ISO, ()).pitch == pytest.approx(PITCH)
+    assert PAPER_PAIR.tooth_pitch == pytest.approx(PITCH)
+    own, given = (PeriodicStiffness(law=ISO, pitch=pitch, harmonics=OVER_A_TOOTH) for pitch in (None, PITCH))
+    motion = pressed(2e-6)._replace(position=0.4e-3, pair=PAPER_PAIR)
+    assert own.force(motion, 1.0) == pytest.approx(given.force(motion, 1.0))
+
+
+def test_a_sweep_over_the_module_moves_the_teeth_of_a_periodic_law():
+    law = PeriodicStiffness(law=Linear(stiffness=1e7, damping=1e3), harmonics=OVER_A_TOOTH)
+
+    def run(module, parameters=None):
+        pair = replace(PAPER_PAIR, module=module)
+        gear = Transmission(
+            shafts={"a": Shaft(inertia=5e-4), "b": Shaft(inertia=1e-3)},
+            meshes={"mesh": Mesh(a="a", b="b", pair=pair, elasticity=law)},
+            input="a",
+            output="b",
+        )
+        plant = Actuator(motor=TorqueSource(), gear=gear, load=Load(damping=0.05))
+        inputs = {"torque_reference": 1.0}
+        return simulate(plant, 0.2, inputs=inputs, parameters=parameters, resolution=1e-3, compiled=False)
+
+    swept, built, plain = run(1e-3, {"gear.meshes.mesh.pair.module": 2e-3}), run(2e-3), run(1e-3)
+    deflection = "gear.meshes.mesh.deflection"
+    assert swept[deflection] == pytest.approx(built[deflection], rel=1e-6, abs=1e-12)
+    assert abs(swept[deflection] - plain[deflection]).max() > 1e-7
+
+
+def test_a_periodic_law_without_pitch_needs_a_pair_with_teeth():
+    law = PeriodicStiffness(law=ISO, harmonics=OVER_A_TOOTH)
+    message = "PeriodicStiffness.pitch is needed, in m: there is no pair that knows its teeth to take it from"
+    with pytest.raises(ValueError, match=message):
+        law.force(pressed(2e-6), 1.0)
+    bare = {"radius_a": 10e-3, "radius_b": 30e-3, "friction_arm_a": 1e-3, "friction_arm_b": 2e-3}
+    with pytest.raises(ValueError, match=message):
+        Mesh(a="a", b="b", pair=GivenPair(**bare), elasticity=law)
+    assert Mesh(a="a", b="b", pair=GivenPair(**bare, tooth_pitch=PITCH), elasticity=law)
 
 
 @few

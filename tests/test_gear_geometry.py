@@ -297,6 +297,23 @@ def test_teeth_that_cannot_mesh_are_refused(changes, message):
         ExternalPair(**STANDARD | changes)
 
 
-def test_radius_of_a_given_pair_must_be_positive():
-    with pytest.raises(ValueError, match="GivenPair.radius_b must be > 0 m, got -0.03 m"):
-        GivenPair(radius_a=10e-3, radius_b=-30e-3, friction_arm_a=1e-3, friction_arm_b=2e-3)
+@pytest.mark.parametrize("radius_b", [0.0, -5e-3, -10e-3])
+def test_the_ring_of_a_given_pair_must_be_larger_than_the_wheel_inside_it(radius_b):
+    with pytest.raises(
+        ValueError, match=rf"radius_b must be > 0 m, or for a ring < -radius_a = -0.01 m, got {radius_b:g} m"
+    ):
+        GivenPair(radius_a=10e-3, radius_b=radius_b, friction_arm_a=1e-3, friction_arm_b=2e-3)
+
+
+def test_a_negative_pitch_radius_is_refused():
+    with pytest.raises(ValueError, match="GivenPair.radius_a must be > 0 m, got -0.01 m"):
+        GivenPair(radius_a=-10e-3, radius_b=30e-3, friction_arm_a=1e-3, friction_arm_b=2e-3)
+
+
+def test_counts_and_lengths_may_be_numbers_of_numpy():
+    pair = ExternalPair(teeth_a=np.int64(20), teeth_b=np.int32(60), module=np.float32(1e-3), shift_a=np.float64(0.1))
+    assert pair.radius_b / pair.radius_a == pytest.approx(3)
+    with pytest.raises(ValueError, match="must be a whole number of teeth >= 1, got np.float64"):
+        ExternalPair(teeth_a=np.float64(20), teeth_b=60, module=1e-3)
+    with pytest.raises(ValueError, match="ExternalPair.module must be > 0 m, got -0.001 m"):
+        ExternalPair(teeth_a=20, teeth_b=60, module=np.float32(-1e-3))

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from oracles import numbers, signs
 from tooth_oracles import RING, averages, by_symbols, internal_pairs, plane, tip_gap, turned_round
 
-from gear import Coulomb, ExternalPair, InternalPair, Linear, Mesh, Shaft, Transmission
+from gear import Coulomb, ExternalPair, GivenPair, InternalPair, Linear, Mesh, Shaft, Transmission
 from gear.involute import Rack, Teeth, gearing
 from gear.tooth_checks import require_possible
 from studies.converter import converter
@@ -186,6 +186,25 @@ def test_forces_and_torques_are_those_of_one_force_at_the_contact(pair, force, p
 
 def moment(arm, force):
     return arm[0] * force[1] - arm[1] * force[0]
+
+
+@settings(deadline=None, max_examples=20)
+@given(pair=internal_pairs(), speed=speeds, force=magnitudes, part=numbers(-0.2, 0.2), flank=signs())
+def test_a_ring_given_by_its_constants_is_the_ring(pair, speed, force, part, flank):
+    given = mesh_of(
+        GivenPair(
+            radius_a=pair.radius_a,
+            radius_b=pair.radius_b,
+            friction_arm_a=pair.friction_arm_a,
+            friction_arm_b=pair.friction_arm_b,
+            friction_factor=pair.friction_factor,
+            pressure_angle=pair.working_angle,
+        )
+    )
+    mesh, load = mesh_of(pair), (flank * force, part * force)
+    assert torques(given, *load) == torques(mesh, *load)
+    assert given.bearing_force(*load, flank) == mesh.bearing_force(*load, flank)
+    assert given.motion(speed, speed)[:-1] == mesh.motion(speed, speed)[:-1]
 
 
 @settings(deadline=None, max_examples=50)

@@ -218,6 +218,8 @@ def test_friction_turns_the_wheels_on_their_averaged_arms():
 
 # -- errors -------------------------------------------------------------------------------------------
 
+WITHOUT_ARMS = GivenPair(radius_a=10e-3, radius_b=30e-3, friction_arm_a=0.0, friction_arm_b=0.0)
+
 
 @pytest.mark.parametrize(
     ("changes", "message"),
@@ -225,6 +227,9 @@ def test_friction_turns_the_wheels_on_their_averaged_arms():
         ({"b": "a"}, "Mesh needs three different shafts, got a='a', b='a', carrier=None"),
         ({"carrier": "a"}, "Mesh needs three different shafts, got a='a', b='b', carrier='a'"),
         ({"carrier": "b"}, "Mesh needs three different shafts, got a='a', b='b', carrier='b'"),
+        ({"count": 0}, "Mesh.count must be a whole number >= 1, got 0"),
+        ({"count": 2.0}, "Mesh.count must be a whole number >= 1, got 2.0"),
+        ({"pair": WITHOUT_ARMS}, "Mesh.friction cannot act: with friction arms of 0 m and 0 m its pair does not slide"),
         (
             {"stick_by": "sliding speed"},
             """Mesh.stick_by must be "mesh speed" or "conjugate speed", got 'sliding speed'""",
@@ -234,3 +239,12 @@ def test_friction_turns_the_wheels_on_their_averaged_arms():
 def test_meshes_that_cannot_be_are_refused(changes, message):
     with pytest.raises(ValueError, match=message):
         dataclasses.replace(mesh_of(PAPER_PAIR, carrier=None), **changes)
+
+
+def test_a_pair_without_friction_arms_can_be_had_without_friction():
+    mesh = dataclasses.replace(mesh_of(PAPER_PAIR, carrier=None), pair=WITHOUT_ARMS, friction=None)
+    assert torques(mesh, 0.0, 100.0) == {"a": 0.0, "b": 0.0}
+
+
+def test_equal_meshes_may_be_counted_by_numpy():
+    assert dataclasses.replace(mesh_of(PAPER_PAIR), count=np.int64(3)).count == 3

@@ -5,17 +5,35 @@ import inspect
 import math
 import pkgutil
 from dataclasses import dataclass, fields, is_dataclass
+from fractions import Fraction
 from typing import Annotated, get_args, get_origin, get_type_hints
 
+import numpy as np
 import pytest
 from annotated_types import Ge, Gt, Le, Lt, Unit
 
 import controllers
 import gear
 from gear import Backlash, Bearing, Coulomb, Coupling, ExternalPair, Linear, Shaft
-from gear.quantities import Length, annotations, check, show, unit_of
+from gear.quantities import Length, annotations, check, check_count, show, unit_of
 
-PARTS_OF_AN_ACTUATOR = ("actuator.inverter", "actuator.load", "actuator.motor")
+PARTS_OF_AN_ACTUATOR = (
+    "actuator.bridge",
+    "actuator.current_source",
+    "actuator.dc_link",
+    "actuator.dc_motor",
+    "actuator.fold_back",
+    "actuator.inverter",
+    "actuator.load",
+    "actuator.noise",
+    "actuator.pmsm",
+    "actuator.rotor",
+    "actuator.saturation",
+    "actuator.sensors",
+    "actuator.temperature",
+    "actuator.thermal",
+    "actuator.torque_source",
+)
 
 
 def components():
@@ -95,6 +113,10 @@ class Sample:
         ({"above": math.inf}, r"Sample.above must be a finite number \[m\], got inf"),
         ({"above": True}, r"Sample.above must be a finite number \[m\], got True"),
         ({"above": "1 m"}, r"Sample.above must be a finite number \[m\], got '1 m'"),
+        ({"above": np.float32(-0.5)}, "Sample.above must be > 0 m, got -0.5 m"),
+        ({"least": np.int64(-3)}, "Sample.least must be >= -2.5 N, got -3 N"),
+        ({"above": np.bool_(True)}, r"Sample.above must be a finite number \[m\], got np.True_"),
+        ({"above": np.array([1.0])}, r"Sample.above must be a finite number \[m\], got array"),
     ],
 )
 def test_a_broken_rule_names_class_field_rule_value_and_unit(values, message):
@@ -124,6 +146,22 @@ def test_a_broken_rule_names_class_field_rule_value_and_unit(values, message):
 def test_shafts_and_what_stands_beside_them_refuse_what_they_cannot_be(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+@pytest.mark.parametrize("value", [np.float64(0.5), np.float32(0.5), np.int64(2), Fraction(1, 2)])
+def test_numbers_of_other_libraries_are_numbers(value):
+    assert Sample(above=value).above == value
+
+
+@pytest.mark.parametrize("count", [1, np.int64(3), np.uint8(2)])
+def test_whole_numbers_of_other_libraries_count(count):
+    check_count(Sample(count=count), "count")
+
+
+@pytest.mark.parametrize("count", [0, 2.0, np.float64(2.0), True, np.bool_(True), "2"])
+def test_what_does_not_count_is_refused(count):
+    with pytest.raises(ValueError, match="Sample.count must be a whole number of planets >= 1, got"):
+        check_count(Sample(count=count), "count", of="planets")
 
 
 def test_values_on_the_edge_of_a_rule_are_taken():

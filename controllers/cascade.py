@@ -1,47 +1,115 @@
 """Cascade of position, speed and current control."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Literal
 
-from controllers.pid import PI, P, limited
-from controllers.rules import Scalar, Speed, check
+from controllers.compensation import Dither, FrictionCompensation, Knocker
+from controllers.feedforward import FeedForward
+from controllers.filters import LeadLag, LowPass, Notch, SecondOrderLowPass
+from controllers.observer import DisturbanceObserver, FilteredDerivative, PositionObserver
+from controllers.pid import PI, P
+from controllers.reference import RateAndAccelerationLimit, RateLimit
+from controllers.rules import Speed, check, check_choice
+from controllers.scheduling import ScheduledGain
+
+Filter = LowPass | SecondOrderLowPass | Notch | LeadLag
+CurrentDemand = Literal["quadrature", "least current"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Remedies:
+    """What is added to the torque demand against stiction; each None is switched off.
+
+    Parameters
+    ----------
+    compensation : FrictionCompensation or None
+        Of dry friction, with a boost to break away.
+    dither : Dither or None
+        A small fast oscillation.
+    knocker : Knocker or None
+        Pulses in the direction of the position error. It needs a sampled controller.
+    """
+
+    compensation: FrictionCompensation | None = None
+    dither: Dither | None = None
+    knocker: Knocker | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class Cascade:
     """Position -> speed -> current, the structure of nearly every servo drive.
 
-        motor speed reference = ratio * position.gain * (reference - measured position), limited
-        motor torque demand   = speed PI on motor speed
+        motor speed reference = ratio * position law (reference - measured position), limited
+        motor torque demand   = speed PI on motor speed, with what is added to it, filtered, limited
         voltage demand        = current PI on each axis of the motor, plus decoupling
 
     Parameters
     ----------
-    position : P
+    position : P or PI
         Gain [1/s] on the position error at the load.
     speed : PI
         Torque at the motor [N m] from the speed error of the motor [rad/s].
-    current : PI
-        Voltage [V] from current error [A], the same on each axis of the motor.
+    current : PI or None
+        Voltage [V] from current error [A], the same on each axis of the motor; None for a motor that gets its
+        current or torque at once.
     speed_limit : float
         Of the motor speed reference [rad/s].
     feedback : "load" or "motor"
         Where the position is measured; at the motor it is divided by the gear ratio.
     decoupling : bool
         Whether the back-emf and the coupling of the axes are added to the voltage demand.
+    reference : RateLimit, RateAndAccelerationLimit or None
+        Limits of the position reference, at the load.
+    feed_forward : FeedForward or None
+        From the limited reference, which it needs.
+    speed_from : FilteredDerivative, PositionObserver or None
+        The motor's speed from its measured angle; None for a tachometer.
+    torque_filters : mapping of str to filter
+        In a row on the torque demand.
+    disturbance_observer : DisturbanceObserver or None
+        Its estimate is taken from the torque demand.
+    remedies : Remedies
+        Against stiction, on the torque demand.
+    current_demand : "quadrature" or "least current"
+        Torque by quadrature current alone, or with the direct current that needs least in all and keeps the voltage
+        limit (maximum torque per ampere and field weakening), for a PMSM.
+    schedule : ScheduledGain or None
+        Factor on the gains of the speed law over "temperature" [K] (of the oil or else the housing) or "load" (the
+        torque demand of the last sample [N m]).
+
+    Raises
+    ------
+    ValueError
+        Where parts do not go together.
     """
 
-    position: P
+    position: P | PI
     speed: PI
-    current: PI
+    current: PI | None
     speed_limit: Speed
     feedback: Literal["load", "motor"] = "load"
     decoupling: bool = True
+    reference: RateLimit | RateAndAccelerationLimit | None = None
+    feed_forward: FeedForward | None = None
+    speed_from: FilteredDerivative | PositionObserver | None = None
+    torque_filters: Mapping[str, Filter] = field(default_factory=dict)
+    disturbance_observer: DisturbanceObserver | None = None
+    remedies: Remedies = field(default_factory=Remedies)
+    current_demand: CurrentDemand = "quadrature"
+    schedule: ScheduledGain | None = None
 
     def __post_init__(self) -> None:
         check(self)
-        if self.feedback not in ("load", "motor"):
-            raise ValueError(f'Cascade.feedback must be "load" or "motor", got {self.feedback!r}')
+        check_choice(self, "feedback", ("load", "motor"))
+        check_choice(self, "current_demand", ("quadrature", "least current"))
+        if self.feed_forward is not None and self.reference is None:
+            raise ValueError(
+                "Cascade.feed_forward needs the speed of the reference: limit it, with reference = RateLimit or "
+                "RateAndAccelerationLimit"
+            )
+        if self.schedule is not None and self.schedule.over not in ("temperature", "load"):
+            raise ValueError(f'Cascade.schedule is over "temperature" or "load", got {self.schedule.over!r}')
 
     @classmethod
     def for_bandwidths(  # noqa: PLR0913 - a design has this many numbers
@@ -70,7 +138,3 @@ class Cascade:
             speed_limit=speed_limit,
             feedback=feedback,
         )
-
-    def speed_reference(self, error: Scalar, ratio: Scalar) -> Scalar:
-        """Motor speed reference [rad/s] from the position error at the load [rad]."""
-        return limited(ratio * self.position.output(error), self.speed_limit)

@@ -1,20 +1,21 @@
-"""P, PI and PID laws: gains frozen, state passed in, designed by bandwidth.
-
-Anti-windup by what was realized: a law proposes an output, something (its own limit, a current limit, the
-voltage of the inverter) realizes part of it, and the integral is driven by the difference, so every limiter
-outside is handled without a special case.
-"""
+"""P, PI and PID laws: gains frozen, state passed in, designed by bandwidth."""
 
 from dataclasses import dataclass
 
-import casadi as ca
-
-from controllers.rules import DerivativeGain, IntegralGain, Limit, PositiveGain, Rate, Scalar, Time, check
-
-
-def limited(value: Scalar, limit: Scalar | None) -> Scalar:
-    """`value` held within +-limit; unchanged for limit None."""
-    return value if limit is None else ca.fmax(-limit, ca.fmin(limit, value))
+from controllers.integral import AntiWindup, IntegralRemedies, advanced, check_anti_windup, memory_of, rate_of
+from controllers.memory import Memory
+from controllers.rules import (
+    DerivativeGain,
+    IntegralGain,
+    Limit,
+    PositiveGain,
+    Rate,
+    Scalar,
+    Share,
+    Time,
+    check,
+)
+from controllers.shapes import closing_rate
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,10 +45,10 @@ class P:
 
 @dataclass(frozen=True, kw_only=True)
 class PI:
-    """Proportional-integral law with output limit and back-calculation.
+    """Proportional-integral law with output limit and anti-windup.
 
-        proposed   = proportional * error + state
-        state'     = integral * error + back_calculation * (realized - proposed)
+        proposed   = proportional * (error - (1 - setpoint_weight) * reference) + state
+        state'     = integral * error + anti-windup
 
     Parameters
     ----------
@@ -59,19 +60,29 @@ class PI:
         Of the magnitude of the output.
     back_calculation : float or None
         Rate [1/s] at which the integral follows a limited output; None for integral/proportional.
+    anti_windup : "back-calculation", "clamping" or "conditional"
+        What the integral does while the output is limited.
+    setpoint_weight : float or None
+        Share of the reference that the proportional part sees [-]; None for all of it.
+    remedies : IntegralRemedies or None
+        Against stiction.
 
     References
     ----------
-    K. J. Astrom, T. Hagglund, "Advanced PID Control" (2006), section 3.5.
+    K. J. Astrom, T. Hagglund, "Advanced PID Control" (2006), sections 3.4 and 3.5.
     """
 
     proportional: PositiveGain
     integral: IntegralGain
     limit: Limit | None = None
     back_calculation: Rate | None = None
+    anti_windup: AntiWindup = "back-calculation"
+    setpoint_weight: Share | None = None
+    remedies: IntegralRemedies | None = None
 
     def __post_init__(self) -> None:
         check(self)
+        check_anti_windup(self)
 
     @classmethod
     def for_inertia(cls, *, inertia: float, bandwidth: float, integral_bandwidth: float) -> "PI":
@@ -85,22 +96,46 @@ class PI:
         """Current control of a winding: its zero cancels R/L, leaving one pole at `bandwidth` [rad/s]."""
         return cls(proportional=bandwidth * inductance, integral=bandwidth * resistance)
 
-    def proposed(self, state: Scalar, error: Scalar) -> Scalar:
-        """Output before any limit."""
-        return self.proportional * error + state
+    def memory(self, unit: str = "output", nominal: float = 1.0) -> tuple[Memory, ...]:
+        """The integral state, and the last error where the integral is reset on reversal."""
+        return memory_of(self, unit, nominal)
 
-    def derivative(self, error: Scalar, proposed: Scalar, realized: Scalar) -> Scalar:
-        """Time derivative of the integral state."""
-        rate = self.integral / self.proportional if self.back_calculation is None else self.back_calculation
-        return self.integral * error + rate * (realized - proposed)
+    def proposed(self, state: Scalar, error: Scalar, reference: Scalar | None = None) -> Scalar:
+        """Output before any limit; `reference` is needed with a set-point weight."""
+        return self.proportional * _weighted(self, error, reference) + state
+
+    def rate_of_integral(self, state: Scalar, error: Scalar, proposed: Scalar, realized: Scalar) -> Scalar:
+        """Time derivative of the integral state, continuous form.
+
+        Raises
+        ------
+        ValueError
+            Where the integral is reset on reversal, which needs a sampled controller.
+        """
+        return rate_of(self, state, error, proposed, realized)
+
+    def advance(  # noqa: PLR0913 - what the law saw, and its period
+        self,
+        state: Scalar,
+        error: Scalar,
+        proposed: Scalar,
+        realized: Scalar,
+        period: Scalar,
+        remembered: Scalar | None = None,
+    ) -> Scalar:
+        """Integral state after a sample, by Euler's forward rule as in drives.
+
+        `remembered` is the last error that was not zero, needed where the integral is reset on reversal.
+        """
+        return advanced(self, state, error, proposed, realized, period, remembered)
 
 
 @dataclass(frozen=True, kw_only=True)
 class PID:
     """Position controller with torque as output, the derivative on the measurement.
 
-        proposed = proportional * error + state - derivative * rate
-        state'   = integral * error + back_calculation * (realized - proposed)
+        proposed = proportional * (error - (1 - setpoint_weight) * reference) + state - derivative * rate
+        state'   = integral * error + anti-windup
 
     `rate` is the measured speed, or with `filter_time` T the filtered derivative of the measured position
     y, rate = (y - z)/T with z' = rate.
@@ -115,10 +150,16 @@ class PID:
         Of the magnitude of the output.
     back_calculation : float or None
         Rate [1/s] at which the integral follows a limited output; None for integral/proportional.
+    anti_windup : "back-calculation", "clamping" or "conditional"
+        What the integral does while the output is limited.
+    setpoint_weight : float or None
+        Share of the reference that the proportional part sees [-]; None for all of it.
+    remedies : IntegralRemedies or None
+        Against stiction.
 
     References
     ----------
-    K. J. Astrom, T. Hagglund, "Advanced PID Control" (2006), sections 3.3 and 3.5.
+    K. J. Astrom, T. Hagglund, "Advanced PID Control" (2006), sections 3.3 to 3.5.
     """
 
     proportional: PositiveGain
@@ -127,9 +168,13 @@ class PID:
     filter_time: Time | None = None
     limit: Limit | None = None
     back_calculation: Rate | None = None
+    anti_windup: AntiWindup = "back-calculation"
+    setpoint_weight: Share | None = None
+    remedies: IntegralRemedies | None = None
 
     def __post_init__(self) -> None:
         check(self)
+        check_anti_windup(self)
 
     @classmethod
     def for_inertia(cls, *, inertia: float, bandwidth: float, filter_time: float | None = None) -> "PID":
@@ -141,15 +186,58 @@ class PID:
             filter_time=filter_time,
         )
 
-    def rate(self, measured: Scalar, filtered: Scalar) -> Scalar:
+    def memory(self, unit: str = "output", nominal: float = 1.0) -> tuple[Memory, ...]:
+        """The integral state, and the last error where the integral is reset on reversal.
+
+        The filtered position is the memory of `rate` and `advance_filtered`.
+        """
+        return memory_of(self, unit, nominal)
+
+    def rate(self, measured: Scalar, filtered: Scalar, period: Scalar | None = None) -> Scalar:
         """Filtered derivative of the measurement; only with `filter_time`."""
-        return (measured - filtered) / self.filter_time
+        if self.filter_time is None:
+            raise ValueError("PID.rate needs a filter_time [s]; without one the speed is measured")
+        if period is None:
+            return (measured - filtered) / self.filter_time
+        return closing_rate(1 / self.filter_time, period) * (measured - filtered)
 
-    def proposed(self, state: Scalar, error: Scalar, rate: Scalar) -> Scalar:
-        """Output before any limit."""
-        return self.proportional * error + state - self.derivative * rate
+    def advance_filtered(self, measured: Scalar, filtered: Scalar, period: Scalar) -> Scalar:
+        """Filtered position after a sample, exact for a measurement that is held."""
+        return filtered + period * self.rate(measured, filtered, period)
 
-    def integral_derivative(self, error: Scalar, proposed: Scalar, realized: Scalar) -> Scalar:
-        """Time derivative of the integral state."""
-        rate = self.integral / self.proportional if self.back_calculation is None else self.back_calculation
-        return self.integral * error + rate * (realized - proposed)
+    def proposed(self, state: Scalar, error: Scalar, rate: Scalar, reference: Scalar | None = None) -> Scalar:
+        """Output before any limit; `reference` is needed with a set-point weight."""
+        return self.proportional * _weighted(self, error, reference) + state - self.derivative * rate
+
+    def rate_of_integral(self, state: Scalar, error: Scalar, proposed: Scalar, realized: Scalar) -> Scalar:
+        """Time derivative of the integral state, continuous form.
+
+        Raises
+        ------
+        ValueError
+            Where the integral is reset on reversal, which needs a sampled controller.
+        """
+        return rate_of(self, state, error, proposed, realized)
+
+    def advance(  # noqa: PLR0913 - what the law saw, and its period
+        self,
+        state: Scalar,
+        error: Scalar,
+        proposed: Scalar,
+        realized: Scalar,
+        period: Scalar,
+        remembered: Scalar | None = None,
+    ) -> Scalar:
+        """Integral state after a sample, by Euler's forward rule as in drives.
+
+        `remembered` is the last error that was not zero, needed where the integral is reset on reversal.
+        """
+        return advanced(self, state, error, proposed, realized, period, remembered)
+
+
+def _weighted(law: PI | PID, error: Scalar, reference: Scalar | None) -> Scalar:
+    if law.setpoint_weight is None:
+        return error
+    if reference is None:
+        raise ValueError(f"{type(law).__name__}.proposed needs the reference, as it has a setpoint_weight")
+    return error - (1 - law.setpoint_weight) * reference

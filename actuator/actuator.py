@@ -1,6 +1,6 @@
 """One actuator: motor, inverter, controller, gear and load, composed into a HybridSystem."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -8,20 +8,28 @@ from typing import Any
 import casadi as ca
 
 from actuator.contacts import ContactMechanics
-from actuator.hybrid import HybridSystem, Quantity
+from actuator.current_source import CurrentSource
+from actuator.dc_link import DCLink
+from actuator.drive import ANGLE, Motion, Site, cascade_drive, loops_of, open_drive, pid_drive
+from actuator.heat import Heat
+from actuator.hybrid import Clock, HybridSystem
 from actuator.inverter import Inverter
+from actuator.ledger import Ledger
+from actuator.linear_load import LinearLoad
 from actuator.load import Load
 from actuator.motor import PMSM, DCMotor, TorqueSource
-from actuator.parameters import parameterize, with_values
+from actuator.observe import Mechanics, observe
+from actuator.parameters import Parameter, parameterize, with_values
+from actuator.sensors import Sensors
+from actuator.thermal import ThermalNetwork
 from controllers.cascade import Cascade
-from controllers.pid import PID, limited
+from controllers.pid import PID
+from controllers.sampling import LOOPS, Sampling
 from gear.transmission import Transmission
 
-# usual sizes, for the error control; an angle is fine when the teeth's deflection is
-ANGLE, SPEED, CURRENT, VOLTAGE, TORQUE = 1e-4, 0.1, 1.0, 1.0, 1.0
-PARTS = ("controller", "inverter", "motor", "gear", "load")
+SPEED = 0.1  # rad/s, a usual size
+PARTS = ("controller", "sampling", "sensors", "link", "inverter", "motor", "thermal", "gear", "load")
 SAME_RATIO = 1e-9
-PREFIX = "inject."  # inputs that are added to a signal inside a loop
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,21 +43,31 @@ class Actuator:
         reference            position reference [rad], with a controller
         torque_reference     motor torque demand [N m], without one
         load_torque          torque on the output shaft [N m]
+        load_force           force on the rod of a LinearLoad [N]
         inject.<signal>      added to a signal of the loop: position, speed_reference, torque_reference,
                              voltage (torque axis); zero unless asked for
 
     Parameters
     ----------
-    motor : TorqueSource, DCMotor or PMSM
-        TorqueSource with a PID or no controller; the others with an inverter and a Cascade.
+    motor : TorqueSource, CurrentSource, DCMotor or PMSM
+        TorqueSource with a PID, a Cascade without current loop, or no controller; CurrentSource with a Cascade without
+        current loop; the others with an inverter and a Cascade.
     gear : Transmission
         From the motor shaft (input) to the load shaft (output).
-    load : Load
+    load : Load or LinearLoad
         On the output shaft.
     inverter : Inverter or None
         For DCMotor and PMSM.
+    link : DCLink or None
+        The voltage of the inverter as a state; None for a constant one.
     controller : PID, Cascade or None
         Position controller.
+    sampling : Sampling or None
+        Periods at which the loops of the controller run; None in continuous time, for design.
+    sensors : Sensors
+        Of angles and currents; those left out are ideal.
+    thermal : ThermalNetwork or None
+        Temperatures of motor, housing and oil; None where nothing depends on them.
     name : str
         For messages and reports.
 
@@ -59,24 +77,20 @@ class Actuator:
         Where the parts do not go together.
     """
 
-    motor: TorqueSource | DCMotor | PMSM
+    motor: TorqueSource | CurrentSource | DCMotor | PMSM
     gear: Transmission
-    load: Load = field(default_factory=Load)
+    load: Load | LinearLoad = field(default_factory=Load)
     inverter: Inverter | None = None
+    link: DCLink | None = None
     controller: PID | Cascade | None = None
+    sampling: Sampling | None = None
+    sensors: Sensors = field(default_factory=Sensors)
+    thermal: ThermalNetwork | None = None
     name: str = "actuator"
 
     def __post_init__(self) -> None:
-        electric = isinstance(self.motor, DCMotor | PMSM)
-        kind = type(self.motor).__name__
-        if electric and not (self.inverter and isinstance(self.controller, Cascade)):
-            raise ValueError(
-                f"Actuator: a {kind} needs an inverter and a Cascade as controller, whose current loop drives it"
-            )
-        if not electric and (self.inverter or isinstance(self.controller, Cascade)):
-            raise ValueError(
-                f"Actuator: a {kind} has no current: leave the inverter out and use a PID or no controller"
-            )
+        _require_drive(self)
+        _require_sampling(self)
 
     def system(self) -> HybridSystem:
         """The actuator as a HybridSystem, every number a named parameter."""
@@ -93,229 +107,175 @@ class Actuator:
         return self is other
 
 
+def _require_drive(actuator: Actuator) -> None:
+    """Raise where motor, inverter and controller do not go together."""
+    controller, kind = actuator.controller, type(actuator.motor).__name__
+    if isinstance(actuator.motor, DCMotor | PMSM):
+        if not (actuator.inverter and isinstance(controller, Cascade) and controller.current):
+            raise ValueError(
+                f"Actuator: a {kind} needs an inverter and a Cascade as controller, whose current loop drives it"
+            )
+    elif actuator.inverter or actuator.link or (isinstance(controller, Cascade) and controller.current):
+        raise ValueError(
+            f"Actuator: a {kind} has no voltage: leave inverter, link and the current loop of a Cascade out"
+        )
+    if isinstance(actuator.motor, CurrentSource) and not isinstance(controller, Cascade):
+        raise ValueError(f"Actuator: a {kind} needs a Cascade as controller, with current = None")
+    if isinstance(controller, Cascade) and controller.current_demand != "quadrature":
+        if not isinstance(actuator.motor, PMSM):
+            raise ValueError(f'Actuator: current_demand "{controller.current_demand}" is for a PMSM, not for a {kind}')
+
+
+def _require_sampling(actuator: Actuator) -> None:
+    """Raise where what needs samples has none, or other ones."""
+    controller, sampling = actuator.controller, actuator.sampling
+    remedies = controller.remedies if isinstance(controller, Cascade) else None
+    if sampling is None:
+        for name in ("motor", "load", "current"):
+            sensor = getattr(actuator.sensors, name)
+            if sensor is not None and (sensor.memory() or sensor.resolution is not None):
+                raise ValueError(
+                    f"Actuator.sensors.{name}: resolution, noise and delay need a sampled controller: give the "
+                    "actuator a sampling, or leave them out"
+                )
+        if remedies is not None and remedies.knocker is not None:
+            raise ValueError("Actuator: a Knocker needs a sampled controller: give the actuator a sampling")
+        return
+    current = isinstance(controller, Cascade) and controller.current
+    needed = {PID: ("position",), Cascade: LOOPS if current else LOOPS[1:]}.get(type(controller), ())
+    present = tuple(name for name in LOOPS if getattr(sampling, name) is not None)
+    if present != needed:
+        raise ValueError(
+            f"Actuator.sampling must have the periods of the loops of its controller "
+            f"({', '.join(needed) or 'there is none'}), got {', '.join(present)}"
+        )
+    for law in (remedies.dither, remedies.knocker) if remedies and sampling.speed else ():
+        if law is not None:
+            law.check_period(sampling.speed)
+
+
 class _Assembly:
-    """One pass through the actuator in the direction of power flow; the equations stand in `_equations`."""
+    """One pass through the actuator in the direction of power flow."""
 
     def __init__(self, actuator: Actuator) -> None:
         parts: dict[str, Any] = {}
-        parameters = []
+        parameters: list[Parameter] = []
         for name in PARTS:
             parts[name], found = parameterize(getattr(actuator, name), name)
             parameters += found
-        self.parts, self.ratio = parts, actuator.gear.ratio()
-        gear: Transmission = parts["gear"]
-        self.kinematics = actuator.gear.kinematics(gear)
+        if actuator.link is not None:
+            parts["link_start"] = actuator.link.source_voltage
+        book = Ledger()
+        heat = Heat(book, parts["thermal"], actuator.thermal)
+        gear: Transmission = heat.oiled(parts["gear"])
+        kinematics = actuator.gear.kinematics(gear)
+        symbols = [
+            {shaft: ca.SX.sym(f"{shaft}.{what}") for shaft in kinematics.independent} for what in ("angle", "speed")
+        ]
+        angle, speed = (kinematics.expand(known) for known in symbols)
+        motion = Motion(
+            motor_angle=angle[gear.input],
+            motor_speed=speed[gear.input],
+            load_angle=angle[gear.output],
+            load_speed=speed[gear.output],
+            ratio=actuator.gear.ratio(),
+        )
         inertia = {name: shaft.inertia for name, shaft in gear.shafts.items()}
         inertia[gear.input] += getattr(parts["motor"], "inertia", 0)
-        inertia[gear.output] += parts["load"].inertia
-        self.inertia = inertia
-        self.contacts = ContactMechanics(gear, actuator.gear.redundant(), self.kinematics, inertia)
+        inertia[gear.output] += parts["load"].inertia_at(motion.load_angle)
+        contacts = ContactMechanics(gear, actuator.gear.redundant(), kinematics, inertia)
 
-        self.states: list[Quantity] = []
-        self.symbols: dict[str, ca.SX] = {}
-        self._declare_states()
-        self.angle, self.speed = (
-            self.kinematics.expand({shaft: self.symbols[f"{shaft}.{what}"] for shaft in self.kinematics.independent})
-            for what in ("angle", "speed")
+        loops, due = loops_of(book, parts["sampling"], actuator.sampling)
+        site = Site(
+            book=book,
+            parts=parts,
+            motion=motion,
+            loops=loops,
+            sensors=actuator.sensors,
+            temperature=heat.of_motor(),
+            housing=heat.of_housing(),
         )
-        self.input_names = self._input_names()
-        self.u = {quantity.name: ca.SX.sym(quantity.name) for quantity in self.input_names}
-
-        mode_names = self.contacts.mode_names()
-        m = ca.SX.sym("m", len(mode_names))
-        x = ca.vertcat(*self.symbols.values())
-        u = ca.vertcat(*self.u.values())
-        p = ca.vertcat(*(parameter.symbol for parameter in parameters))
-        self.outputs: dict[str, tuple[str, ca.SX]] = {}
-        rates, torque = self._equations(m)
-        angle, speed = self.angle, self.speed
-        modes = self.contacts.modes(m)
-        forces = self.contacts.forces(angle, speed, torque, modes)
-        for shaft in self.kinematics.independent:
-            rates[f"{shaft}.angle"], rates[f"{shaft}.speed"] = speed[shaft], forces.acceleration[shaft]
-        self._observe(forces, modes, angle, speed, self.contacts.rigid_forces(forces, angle, speed, torque))
-
-        arguments = [x, m, u, p]
-        fired = ca.SX.sym("fired", len(self.contacts.margin_names()))
-        settle = self.contacts.reset_function("settle", arguments, fired, angle, speed, torque, m)
-        self.system = HybridSystem(
-            name=actuator.name,
-            states=tuple(self.states),
-            modes=tuple(mode_names),
-            inputs=tuple(self.input_names),
-            outputs=tuple(Quantity(name, unit) for name, (unit, _) in self.outputs.items()),
-            margin_names=tuple(self.contacts.margin_names()),
-            parameters=tuple(parameters),
-            travel=_travel(actuator.gear),
-            flow=ca.Function("flow", arguments, [ca.vertcat(*(rates[state.name] for state in self.states))]),
-            margins=ca.Function("margins", arguments, [self.contacts.margins(forces, modes)]),
-            reset=self._whole_reset(settle, arguments),
-            check=lambda values: _check_values(actuator, values),
-            outputs_function=ca.Function(
-                "outputs", arguments, [ca.vertcat(*(value for _, value in self.outputs.values()))]
-            ),
-        )
-
-    # -- names ----------------------------------------------------------------------------------------
-
-    def _declare_states(self) -> None:
-        controller, motor = self.parts["controller"], self.parts["motor"]
-        axes = getattr(motor, "axes", ())
-        if isinstance(controller, PID):
-            self._state("controller.integral", "N m", TORQUE)
-            if controller.filter_time is not None:
-                self._state("controller.filtered_position", "rad", ANGLE)
-        if isinstance(controller, Cascade):
-            self._state("controller.speed.integral", "N m", TORQUE)
-            for axis in axes:
-                self._state(f"controller.{axis}.integral", "V", VOLTAGE)
-        for axis in axes:
-            self._state(f"motor.{axis}", "A", CURRENT)
-        for shaft in self.kinematics.independent:
-            self._state(f"{shaft}.angle", "rad", ANGLE)
-        for shaft in self.kinematics.independent:
-            self._state(f"{shaft}.speed", "rad/s", SPEED)
-
-    def _state(self, name: str, unit: str, nominal: float) -> None:
-        self.states.append(Quantity(name, unit, nominal))
-        self.symbols[name] = ca.SX.sym(name)
-
-    def _input_names(self) -> list[Quantity]:
-        found = [Quantity("load_torque", "N m")]
-        controller = self.parts["controller"]
-        if controller is None:
-            return [Quantity("torque_reference", "N m"), *found]
-        found = [Quantity("reference", "rad"), *found, Quantity(PREFIX + "position", "rad")]
-        if isinstance(controller, Cascade):
-            found.append(Quantity(PREFIX + "speed_reference", "rad/s"))
-        found.append(Quantity(PREFIX + "torque_reference", "N m"))
-        if isinstance(controller, Cascade):
-            found.append(Quantity(PREFIX + "voltage", "V"))
-        return found
-
-    # -- equations ------------------------------------------------------------------------------------
-
-    def _equations(self, m: ca.SX) -> tuple[dict[str, ca.SX], dict[str, ca.SX]]:
-        """Rates of the controller and motor states, and the torques they and the load put on the shafts."""
-        gear, load = self.parts["gear"], self.parts["load"]
-        angle, speed = self.angle, self.speed
-        rates: dict[str, ca.SX] = {}
-        drive: Callable = {PID: self._pid, Cascade: self._cascade}.get(type(self.parts["controller"]), self._open)
-        motor_torque = drive(rates)
-        load_torque = load.torque(angle[gear.output], speed[gear.output]) + self.u["load_torque"]
+        drive = {PID: pid_drive, Cascade: cascade_drive}.get(type(parts["controller"]), open_drive)
         torque = dict.fromkeys(gear.shafts, ca.SX(0))
+        motor_torque, load_torque = drive(site), self._load_torque(book, parts["load"], motion)
         torque[gear.input] += motor_torque
         torque[gear.output] += load_torque
-        self._output("motor_torque", "N m", motor_torque)
-        self._output("total_load_torque", "N m", load_torque)
-        return rates, torque
+        book.output("motor_torque", "N m", motor_torque)
+        book.output("total_load_torque", "N m", load_torque)
 
-    def _open(self, rates: dict[str, ca.SX]) -> ca.SX:
-        return limited(self.u["torque_reference"], self.parts["motor"].torque_limit)
+        m = ca.SX.sym("m", len(contacts.mode_names()))
+        modes = contacts.modes(m)
+        forces = contacts.forces(angle, speed, torque, modes)
+        for known, unit, nominal, rates in (
+            (symbols[0], "rad", ANGLE, speed),
+            (symbols[1], "rad/s", SPEED, forces.acceleration),
+        ):
+            for shaft, symbol in known.items():
+                book.state(symbol.name(), unit, nominal, symbol=symbol)
+                book.rate(symbol.name(), rates[shaft])
+        seen = Mechanics(contacts, forces, modes, angle, speed, torque)
+        observe(book, seen, motion)
+        site.losses.update(seen.losses())
+        heat.feed(site.losses)
 
-    def _pid(self, rates: dict[str, ca.SX]) -> ca.SX:
-        pid, integral = self.parts["controller"], self.symbols["controller.integral"]
-        output_shaft = self.parts["gear"].output
-        position = self._point("position", "rad", self.angle[output_shaft])
-        rate = self.speed[output_shaft]
-        if pid.filter_time is not None:
-            rate = pid.rate(position, self.symbols["controller.filtered_position"])
-            rates["controller.filtered_position"] = rate
-        error = self.u["reference"] - position
-        proposed = pid.proposed(integral, error, rate)
-        at_motor = limited(limited(proposed, pid.limit) / self.ratio, self.parts["motor"].torque_limit)
-        torque = at_motor * self.ratio
-        rates["controller.integral"] = pid.integral_derivative(error, proposed, torque)
-        # the demand is at the load; an ideal motor in front of a gear turns `ratio` times as fast
-        self._output("position_error", "rad", error)
-        return self._point("torque_reference", "N m", at_motor)
+        arguments = [book.x(), m, book.u(), ca.vertcat(*(parameter.symbol for parameter in parameters))]
+        fired = ca.SX.sym("fired", len(contacts.margin_names()))
+        settle = contacts.reset_function("settle", arguments, fired, angle, speed, torque, m)
+        clocks = _clocks(actuator.sampling)
+        self.system = HybridSystem(
+            name=actuator.name,
+            states=book.states,
+            modes=tuple(contacts.mode_names()),
+            inputs=book.inputs,
+            outputs=book.outputs,
+            margin_names=tuple(contacts.margin_names()),
+            parameters=tuple(parameters),
+            travel=_travel(actuator.gear),
+            flow=ca.Function("flow", arguments, [book.flow()]),
+            margins=ca.Function("margins", arguments, [contacts.margins(forces, modes)]),
+            reset=_whole_reset(settle, arguments, [state.name for state in book.states], list(symbols[1].values())),
+            check=lambda values: _check_values(actuator, values),
+            outputs_function=ca.Function("outputs", arguments, [book.y()]),
+            clocks=clocks,
+            tick=ca.Function("tick", [due, *arguments], [book.after_tick()]) if clocks else None,
+            period=ca.Function("period", arguments[3:], [parts["sampling"].base]) if clocks else None,
+        )
 
-    def _cascade(self, rates: dict[str, ca.SX]) -> ca.SX:
-        cascade, motor, inverter = self.parts["controller"], self.parts["motor"], self.parts["inverter"]
-        gear = self.parts["gear"]
-        motor_speed = self.speed[gear.input]
-        at_load = self.angle[gear.output]
-        at_motor = self.angle[gear.input] / self.ratio
-        position = self._point("position", "rad", at_load if cascade.feedback == "load" else at_motor)
-        error = self.u["reference"] - position
+    def _load_torque(self, book: Ledger, load: Any, motion: Motion) -> ca.SX:
+        """Of the load itself and from outside, as a torque on the output shaft."""
+        outside = book.input("load_torque", "N m")
+        if not isinstance(load, LinearLoad):
+            return load.torque(motion.load_angle, motion.load_speed) + outside
+        force = book.input("load_force", "N")
+        book.output("rod_position", "m", load.position(motion.load_angle))
+        book.output("rod_speed", "m/s", load.speed(motion.load_angle, motion.load_speed))
+        return load.torque(motion.load_angle, motion.load_speed, force) + outside
 
-        speed_reference = self._point("speed_reference", "rad/s", cascade.speed_reference(error, self.ratio))
-        speed_error = speed_reference - motor_speed
-        demanded = cascade.speed.proposed(self.symbols["controller.speed.integral"], speed_error)
-        asked = inverter.allow(motor.current_for(limited(demanded, cascade.speed.limit)))
-        allowed = asked * motor.current_for(1.0) ** -1
-        rates["controller.speed.integral"] = cascade.speed.derivative(speed_error, demanded, allowed)
-        torque_reference = self._point("torque_reference", "N m", allowed)
 
-        currents = [self.symbols[f"motor.{axis}"] for axis in motor.axes]
-        references = motor.references(motor.current_for(torque_reference))
-        errors = [reference - current for reference, current in zip(references, currents, strict=True)]
-        coupling = motor.coupling_voltages(currents, motor_speed)
-        wanted = []
-        for axis, current_error, motion in zip(motor.axes, errors, coupling, strict=True):
-            proposal = cascade.current.proposed(self.symbols[f"controller.{axis}.integral"], current_error)
-            wanted.append(limited(proposal + motion if cascade.decoupling else proposal, cascade.current.limit))
-        realized = inverter.realize(wanted)
-        for axis, current_error, want, got in zip(motor.axes, errors, wanted, realized, strict=True):
-            rates[f"controller.{axis}.integral"] = cascade.current.derivative(current_error, want, got)
-        realized[-1] = self._point("voltage", "V", realized[-1])
-        for axis, rate in zip(motor.axes, motor.derivatives(currents, realized, motor_speed), strict=True):
-            rates[f"motor.{axis}"] = rate
+def _whole_reset(settle: ca.Function, arguments: list[ca.SX], states: list[str], speeds: list[ca.SX]) -> ca.Function:
+    """Reset of the mechanics, everything else unchanged."""
+    inputs = [ca.MX.sym(f"input{i}", settle.size1_in(i)) for i in range(1 + len(arguments))]
+    after, modes, fault = settle(*inputs)
+    x, first = inputs[1], states.index(speeds[0].name())
+    return ca.Function("reset", inputs, [ca.vertcat(x[:first, :], after, x[first + len(speeds) :, :]), modes, fault])
 
-        self._output("position_error", "rad", error)
-        self._output("current", "A", currents[-1])
-        self._output("voltage_magnitude", "V", ca.sqrt(sum(v**2 for v in realized) + 1e-12))
-        return motor.torque(currents)
 
-    def _point(self, name: str, unit: str, computed: ca.SX) -> ca.SX:
-        """A named signal of the loop: observed as computed, used with what is injected there."""
-        self._output(name, unit, computed)
-        injected = self.u.get(PREFIX + name)
-        return computed if injected is None else computed + injected
-
-    # -- outputs --------------------------------------------------------------------------------------
-
-    def _output(self, name: str, unit: str, value: Any) -> None:
-        self.outputs[name] = (unit, ca.SX(value))
-
-    def _observe(self, forces: Any, modes: Any, angle: dict, speed: dict, rigid: dict) -> None:
-        gear: Transmission = self.parts["gear"]
-        for side, shaft in (("motor", gear.input), ("load", gear.output)):
-            self._output(f"{side}_angle", "rad", angle[shaft])
-            self._output(f"{side}_speed", "rad/s", speed[shaft])
-        self._output("motor_angle_at_load", "rad", angle[gear.input] / self.ratio)
-        friction: dict[str, ca.SX] = {}
-        for k, contact in enumerate(self.contacts.contacts):
-            unit = ("m/s", "N") if contact.name.startswith("meshes.") else ("rad/s", "N m")
-            self._output(f"gear.{contact.name}.slip_speed", unit[0], forces.slip[k])
-            self._output(f"gear.{contact.name}.friction", unit[1], forces.friction[k])
-            work = -forces.friction[k] * sum(arm * speed[shaft] for shaft, arm in contact.torque.items())
-            self._output(f"gear.{contact.name}.friction_loss", "W", work)
-            friction[contact.name] = forces.friction[k]
-        for name, normal in {**forces.normal, **rigid}.items():
-            mesh, path = gear.meshes[name], f"gear.meshes.{name}"
-            self._output(f"{path}.normal_force", "N", normal)
-            if name in forces.motions:
-                self._output(f"{path}.deflection", "m", forces.motions[name].deflection)
-            flank = ca.if_else(normal < 0, -1, 1)
-            bearing = mesh.bearing_force(normal, friction.get(f"meshes.{name}", 0.0), flank)
-            self._output(f"{path}.bearing_force_x", "N", bearing.x)
-            self._output(f"{path}.bearing_force_y", "N", bearing.y)
-        kinetic = sum(self.inertia[shaft] * speed[shaft] ** 2 / 2 for shaft in gear.shafts)
-        self._output("mechanical_energy", "J", kinetic + gear.elastic_energy(forces.motions, angle, modes.flank))
-
-    def _whole_reset(self, settle: ca.Function, arguments: list[ca.SX]) -> ca.Function:
-        """Reset of the mechanics, everything else unchanged; speeds are the last states."""
-        inputs = [ca.MX.sym(f"input{i}", settle.size1_in(i)) for i in range(1 + len(arguments))]
-        speeds, modes, fault = settle(*inputs)
-        count = speeds.shape[0]
-        x = inputs[1]
-        return ca.Function("reset", inputs, [ca.vertcat(x[: x.shape[0] - count], speeds), modes, fault])
+def _clocks(sampling: Sampling | None) -> tuple[Clock, ...]:
+    """One per loop that has a period, the fastest first."""
+    if sampling is None:
+        return ()
+    return tuple(Clock(name, sampling.every(name)) for name in LOOPS if getattr(sampling, name) is not None)
 
 
 def _check_values(actuator: Actuator, values: Mapping[str, float]) -> None:
     """Raise where parameters break a rule, or change what the model was built on."""
     parts = {name: with_values(getattr(actuator, name), name, values) for name in PARTS}
+    clocks = _clocks(parts["sampling"])
+    if clocks != _clocks(actuator.sampling):
+        raise ValueError(
+            f"{actuator.name}: these periods change how many ticks lie between the samples of a loop, on which "
+            "the model is built; change all periods by the same factor, or make a new Actuator"
+        )
     before, after = actuator.gear.ratio(), parts["gear"].ratio()
     if abs(after - before) > SAME_RATIO * abs(before):
         raise ValueError(

@@ -1,11 +1,12 @@
 """The mechanics of a transmission as a hybrid automaton: margins, accelerations and the reset of its contacts."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import casadi as ca
 
 from actuator.hybrid import MARGIN_BAND
+from gear.couplings import TWIST_NOMINAL, Twist
 from gear.elasticity import DEFLECTION_NOMINAL, has_gap
 from gear.kinematics import Kinematics
 from gear.motion import MeshMotion
@@ -21,7 +22,7 @@ class ContactModes(NamedTuple):
     """The mode variables of a transmission."""
 
     motion: ca.SX  # (K, 1): 0 stuck, +-1 sliding, +-2 stuck at the limit
-    flank: dict[str, ca.SX]  # per mesh: +1, -1, 0 in the gap
+    flank: dict[str, ca.SX]  # per mesh, coupling and end stop, by path: +1, -1, 0 in the gap
 
 
 class ContactForces(NamedTuple):
@@ -29,6 +30,8 @@ class ContactForces(NamedTuple):
 
     motions: dict[str, MeshMotion]  # per mesh
     normal: dict[str, Matrix]  # signed normal force per mesh [N]
+    twists: dict[str, Twist]  # per coupling and end stop, by path
+    passed: dict[str, Matrix]  # torque passed per coupling and end stop [N m], by path
     slip: Matrix  # slip speed
     static: Matrix  # friction limit at rest
     sliding: Matrix  # friction while sliding at the present speed
@@ -50,7 +53,7 @@ class ContactMechanics:
     kinematics : Kinematics
         Which shafts move independently.
     inertia : mapping of str to SX
-        Total inertia per shaft.
+        Total inertia per shaft; it may depend on the angles.
     """
 
     def __init__(
@@ -61,20 +64,31 @@ class ContactMechanics:
         self.contacts: list[Contact] = gear.contacts()
         # without a gap the flank only matters to friction, where the size of the normal force has a kink
         laws = {name: mesh.law() for name, mesh in gear.meshes.items() if not mesh.rigid}
-        self.laws = {name: law for name, law in laws.items() if has_gap(law) or gear.meshes[name].friction is not None}
+        self.laws = {
+            f"meshes.{name}": law
+            for name, law in laws.items()
+            if has_gap(law) or gear.meshes[name].friction is not None
+        }
+        still = Twist(0.0, 0.0)
+        self.plays = {path: part for path, part in gear.springs().items() if part.penetration(still, 1.0) is not None}
+        self.gapped = [path for path, law in self.laws.items() if has_gap(law)] + [*self.plays]
+        self.flanks = [*self.laws, *self.plays]
 
     def mode_names(self) -> list[str]:
-        """Names of the mode variables: a motion per contact, a flank per mesh."""
-        return [f"gear.{contact.name}.motion" for contact in self.contacts] + [
-            f"gear.meshes.{name}.flank" for name in self.laws
-        ]
+        """Names of the mode variables: a motion per contact, a flank per mesh, coupling with a gap and end stop."""
+        motions = [f"gear.{contact.name}.motion" for contact in self.contacts]
+        return motions + [f"gear.{path}.flank" for path in self.flanks]
 
     def modes(self, m: ca.SX) -> ContactModes:
         """The mode variables from the vector m; rounding is taken off here, once."""
         whole = [ca.sign(m[k]) * ((ca.fabs(m[k]) > 0.5) + (ca.fabs(m[k]) > 1.5)) for k in range(m.shape[0])]  # noqa: PLR2004
         count = len(self.contacts)
-        flanks = dict.fromkeys(self.gear.meshes, ca.SX(1)) | dict(zip(self.laws, whole[count:], strict=True))
-        return ContactModes(ca.vertcat(*whole[:count]), flanks)
+        return ContactModes(ca.vertcat(*whole[:count]), self._all_flanks(whole[count:]))
+
+    def _all_flanks(self, flanks: Sequence[ca.SX]) -> dict[str, ca.SX]:
+        """Flanks by path; +1 where a mesh or coupling has only one."""
+        paths = [*(f"meshes.{name}" for name in self.gear.meshes), *self.gear.springs()]
+        return dict.fromkeys(paths, ca.SX(1)) | dict(zip(self.flanks, flanks, strict=True))
 
     def slip_speeds(self, speed: Mapping[str, Scalar]) -> Matrix:
         """Slip speed of each contact."""
@@ -86,7 +100,9 @@ class ContactMechanics:
         slip = self.slip_speeds(speed)
         motions = self.gear.motions(angle, speed)
         normal = self.gear.normal_forces(motions, modes.flank)
-        smooth = self.gear.torques(angle, speed, normal)
+        twists = self.gear.twists(angle, speed)
+        passed = self.gear.passed_torques(twists, modes.flank)
+        smooth = self.gear.torques(speed, normal, passed)
         free = self.inertia.accelerations({shaft: value + torque.get(shaft, 0) for shaft, value in smooth.items()})
         demand = ca.vertcat(*(sum(c * free[shaft] for shaft, c in contact.slip.items()) for contact in self.contacts))
         compliance = self.compliance()
@@ -97,7 +113,9 @@ class ContactMechanics:
         scalar = friction(compliance, demand, held, given, self.redundant)
         answer = self.inertia.accelerations(self.friction_torques(scalar))
         acceleration = {shaft: free[shaft] + answer[shaft] for shaft in self.gear.shafts}
-        return ContactForces(motions, normal, slip, static, sliding, compliance, demand, scalar, acceleration)
+        return ContactForces(
+            motions, normal, twists, passed, slip, static, sliding, compliance, demand, scalar, acceleration
+        )
 
     def compliance(self) -> Matrix:
         """G of the joint decision: slip acceleration of contact i per unit of friction against it in contact k."""
@@ -120,7 +138,7 @@ class ContactMechanics:
         rows = [self.gear.meshes[name].deflection_per_shaft() for name in rigid] + [{s: 1.0} for s in self.gear.fixed]
         if not rigid:
             return {}
-        smooth, stuck = self.gear.torques(angle, speed, forces.normal), self.friction_torques(forces.friction)
+        smooth, stuck = self.gear.torques(speed, forces.normal, forces.passed), self.friction_torques(forces.friction)
         free = {s: (smooth[s] + stuck[s] + torque.get(s, 0)) / self.masses[s] for s in self.gear.shafts}
         compliance, demand = ca.SX(len(rows), len(rows)), ca.SX(len(rows), 1)
         for i, row in enumerate(rows):
@@ -151,21 +169,24 @@ class ContactMechanics:
     def _engaged(self, modes: ContactModes) -> Matrix:
         """1 per contact, 0 for a mesh in its gap."""
         return ca.vertcat(
-            *(
-                ca.fabs(modes.flank[contact.name.removeprefix("meshes.")]) if contact.name.startswith("meshes.") else 1
-                for contact in self.contacts
-            )
+            *(ca.fabs(modes.flank[contact.name]) if contact.name in modes.flank else 1 for contact in self.contacts)
         )
 
     # -- margins --------------------------------------------------------------------------------------
 
     def margin_names(self) -> list[str]:
-        """Two margins per contact, two per mesh with a gap and one per mesh without."""
+        """Two margins per contact, two per mesh, coupling or stop with a gap and one per mesh without."""
         names = [f"gear.{contact.name} {end}" for contact in self.contacts for end in ("upper", "lower")]
-        for name, law in self.laws.items():
-            sides = ("flank +", "flank -") if has_gap(law) else ("flank",)
-            names += [f"gear.meshes.{name} {side}" for side in sides]
+        for path in self.flanks:
+            sides = ("flank +", "flank -") if path in self.gapped else ("flank",)
+            names += [f"gear.{path} {side}" for side in sides]
         return names
+
+    def _beyond(self, path: str, motions: Mapping, twists: Mapping, side: int) -> Scalar:
+        """How far teeth or coupling are beyond their gap on a side, over a usual size."""
+        if path in self.plays:
+            return self.plays[path].penetration(twists[path], side) / TWIST_NOMINAL
+        return self.laws[path].penetration(motions[path.removeprefix("meshes.")], side) / DEFLECTION_NOMINAL
 
     def margins(self, forces: ContactForces, modes: ContactModes) -> Matrix:
         """Margins in the order of `margin_names`.
@@ -185,35 +206,38 @@ class ContactMechanics:
                 ca.if_else(stuck, room[0], ca.if_else(slides, speed, INACTIVE)),
                 ca.if_else(stuck, room[1], INACTIVE),
             ]
-        for name, law in self.laws.items():
-            flank = modes.flank[name]
-            if not has_gap(law):
-                rows.append(flank * forces.normal[name] / (law.nominal_force() * self.gear.meshes[name].count))
+        for path in self.flanks:
+            flank = modes.flank[path]
+            if path not in self.gapped:
+                name = path.removeprefix("meshes.")
+                usual = self.laws[path].nominal_force() * self.gear.meshes[name].count
+                rows.append(flank * forces.normal[name] / usual)
                 continue
             for side in (1, -1):
-                beyond = law.penetration(forces.motions[name], side) / DEFLECTION_NOMINAL
+                beyond = self._beyond(path, forces.motions, forces.twists, side)
                 rows.append(ca.if_else(ca.eq(flank, side), beyond, ca.if_else(ca.eq(flank, 0), -beyond, INACTIVE)))
         return ca.vertcat(*rows) + MARGIN_BAND
 
     # -- reset ----------------------------------------------------------------------------------------
 
     def flanks_after(self, fired: Matrix, angle: Mapping, speed: Mapping, before: Mapping[str, Scalar]) -> list[ca.SX]:
-        """Flank of each mesh after an event; from the deflection where the event was elsewhere."""
-        motions = self.gear.motions(angle, speed)
+        """Flank of each mesh, coupling and stop after an event; from where it is if the event was elsewhere."""
+        motions, twists = self.gear.motions(angle, speed), self.gear.twists(angle, speed)
         row, found = 2 * len(self.contacts), []
-        for name, law in self.laws.items():
-            if not has_gap(law):
-                force = law.force(motions[name], before[name])
+        for path in self.flanks:
+            flank = before[path]
+            if path not in self.gapped:
+                force = self.laws[path].force(motions[path.removeprefix("meshes.")], flank)
                 kept = ca.if_else(ca.fabs(force) > 0, ca.sign(force), 1)
-                turned = ca.if_else(ca.eq(before[name], 0), kept, -before[name])
+                turned = ca.if_else(ca.eq(flank, 0), kept, -flank)
                 found.append(ca.if_else(fired[row], turned, kept))
                 row += 1
                 continue
-            deep = [law.penetration(motions[name], side) > 0 for side in (1, -1)]
+            deep = [self._beyond(path, motions, twists, side) > 0 for side in (1, -1)]
             sides = ca.if_else(deep[0], 1, ca.if_else(deep[1], -1, 0))
             # the flank that fired: engaged if it was in the gap, in the gap if it was engaged
-            plus = ca.if_else(ca.eq(before[name], 0), 1, 0)
-            minus = ca.if_else(ca.eq(before[name], 0), -1, 0)
+            plus = ca.if_else(ca.eq(flank, 0), 1, 0)
+            minus = ca.if_else(ca.eq(flank, 0), -1, 0)
             found.append(ca.if_else(fired[row], plus, ca.if_else(fired[row + 1], minus, sides)))
             row += 2
         return found
@@ -265,8 +289,7 @@ class ContactMechanics:
         """
         before = self.modes(m)
         flank = self.flanks_after(fired, angle, speed, before.flank)
-        named = dict.fromkeys(self.gear.meshes, ca.SX(1)) | dict(zip(self.laws, flank, strict=True))
-        problem = self.problem(fired, angle, speed, torque, before.motion, named)
+        problem = self.problem(fired, angle, speed, torque, before.motion, self._all_flanks(flank))
         impulse = friction(
             problem.compliance, self.slip_speeds(speed), problem.rest, ca.SX.zeros(len(self.contacts)), self.redundant
         )

@@ -4,13 +4,18 @@ It knows no physics. An event fires only where a margin falls from positive to n
 already negative is never seen again. So every margin is looked at on every output point, and where one is
 negative the interval is run again in finer steps until the violation is pinned down, and the modes are
 settled there. Intervals with more events than the log holds are run again in finer steps too.
+
+With sampled controllers a window is a number of ticks; where anything is amiss behind one of them, the time up
+to the next tick is run again by the means above.
 """
 
 import contextlib
 import io
-from collections.abc import Callable
+import itertools
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import casadi as ca
@@ -19,10 +24,18 @@ import numpy as np
 from actuator.compiled import compile_function
 from actuator.hybrid import HybridSystem
 from actuator.signals import Piece
-from actuator.window import INTERVALS, LOG_SLOTS, InputForm, ModeCode, window_function
+from actuator.window import (
+    INTERVALS,
+    LOG_SLOTS,
+    VIOLATION,
+    InputForm,
+    ModeCode,
+    ticks_function,
+    window_function,
+)
 
-VIOLATION = 1e-9  # a margin below minus this is a missed event, not rounding
 FINEST_WINDOW = 1e-7  # s; a window that fails at this length is a failure of the model
+ON_TIME = 1e-9  # part of a period within which an instant is that of a tick
 
 
 class SimulationError(RuntimeError):
@@ -93,11 +106,15 @@ class EngineOptions:
         True and False insist; None compiles where a C compiler is present.
     waves : int
         Number of sine waves that the inputs need at the same time.
+    fine, stride : int
+        Output intervals between two ticks of sampled controllers, or ticks between two output points; one of them is 1.
     """
 
     tolerance: float = 1e-7
     compiled: bool | None = None
     waves: int = 0
+    fine: int = 1
+    stride: int = 1
 
 
 def _called(window: ca.Function, arguments: tuple) -> tuple[list[np.ndarray], str]:
@@ -108,6 +125,21 @@ def _called(window: ca.Function, arguments: tuple) -> tuple[list[np.ndarray], st
     except RuntimeError as error:
         return [], str(error).strip().splitlines()[-1]
     return raw, "" if all(np.isfinite(array).all() for array in raw) else "the state is no longer finite"
+
+
+def _stretches(time: float, end: float, period: float) -> list[tuple[float, float, int, int]]:
+    """(begin, stop, index, whole): up to the first tick (index -1), `whole` periods from a tick, the rest after one."""
+    if math.isinf(period):
+        return [(time, end, -1, 0)]
+    first, last = math.ceil(time / period - ON_TIME), math.floor(end / period + ON_TIME)
+    if first > last:
+        return [(time, end, -1, 0)]
+    found = [
+        (time, first * period, -1, 0),
+        (first * period, last * period, first, last - first),
+        (last * period, end, last, 0),
+    ]
+    return [stretch for stretch in found if stretch[1] - stretch[0] > ON_TIME * period]
 
 
 @lru_cache(maxsize=32)
@@ -122,12 +154,30 @@ class Engine:
     def __init__(self, system: HybridSystem, options: EngineOptions) -> None:
         self.system, self.options = system, options
         self.form, self.code = InputForm(len(system.inputs), options.waves), ModeCode(len(system.modes))
-        function = window_function(system, self.form, self.code, options.tolerance)
-        loaded = None if options.compiled is False else compile_function(function)
-        if loaded is None and options.compiled:
+        # a window of ticks has about as many output points as one without
+        self.count = max(1, INTERVALS // options.fine) * options.stride
+        self.compiled = (self.ticks if system.clocks else self.window)[1] is not None
+
+    @cached_property
+    def window(self) -> tuple[ca.Function, ca.Function | None]:
+        """A window without ticks, interpreted and compiled."""
+        return self._built(window_function(self.system, self.form, self.code, self.options.tolerance))
+
+    @cached_property
+    def ticks(self) -> tuple[ca.Function, ca.Function | None]:
+        """A window of `count` ticks, interpreted and compiled."""
+        options = self.options
+        return self._built(
+            ticks_function(
+                self.system, self.form, self.code, options.tolerance, self.count, options.fine, options.stride
+            )
+        )
+
+    def _built(self, function: ca.Function) -> tuple[ca.Function, ca.Function | None]:
+        loaded = None if self.options.compiled is False else compile_function(function)
+        if loaded is None and self.options.compiled:
             raise RuntimeError("EngineOptions.compiled=True needs a C compiler (cc, gcc or $CC); none was found")
-        self.compiled = loaded is not None
-        self.interpreted, self.window = function, loaded or function
+        return function, loaded
 
     def settle(
         self, time: float, x: np.ndarray, m: np.ndarray, u: np.ndarray, p: np.ndarray
@@ -145,6 +195,117 @@ class Engine:
             raise self._inconsistent(time, modes)
         return state.full().ravel(), modes
 
+    def advance(  # noqa: PLR0913 - where from, where to, in which state, with which inputs
+        self, time: float, end: float, x: np.ndarray, m: np.ndarray, p: np.ndarray, pieces: list[Piece], longest: float
+    ) -> Iterator[Window]:
+        """From `time` to `end` with the ticks between, window by window, output points at most `longest` apart.
+
+        A tick at `time` is run, one at `end` is not.
+        """
+        period = self.system.tick_period(p)
+        for begin, stop, index, whole in _stretches(time, end, period):
+            now = [piece.after(begin - time) for piece in pieces]
+            if whole:
+                windows = self._many_ticks(index, whole, x, m, p, now)
+            else:
+                if index >= 0:
+                    x, m = self.tick(index, begin, x, m, np.array([piece(0.0) for piece in now]), p)
+                windows = self._smooth(begin, stop, x, m, p, now, longest)
+            for window in windows:
+                yield window
+                x, m = window.end
+
+    def tick(
+        self, index: int, time: float, x: np.ndarray, m: np.ndarray, u: np.ndarray, p: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """State and modes after all laws that are due have run once."""
+        assert self.system.tick is not None
+        after = self.system.tick(self.system.due(np.array([index])), x, m, u, p).full().ravel()
+        margins = self.system.margins(after, m, u, p).full()
+        return self.settle(time, after, m, u, p) if margins.size and margins.min() < 0 else (after, m)
+
+    def _smooth(  # noqa: PLR0913 - as `advance`
+        self, time: float, end: float, x: np.ndarray, m: np.ndarray, p: np.ndarray, pieces: list[Piece], longest: float
+    ) -> Iterator[Window]:
+        """Windows without ticks."""
+        count = math.ceil((end - time) / (INTERVALS * longest) * (1 - 1e-12))
+        edges = [time + (end - time) * k / count for k in range(count)] + [end]
+        for first, last in itertools.pairwise(edges):
+            window = self.run(first, last - first, x, m, p, [piece.after(first - time) for piece in pieces])
+            yield window
+            x, m = window.end
+
+    def _many_ticks(
+        self, first: int, count: int, x: np.ndarray, m: np.ndarray, p: np.ndarray, pieces: list[Piece]
+    ) -> Iterator[Window]:
+        """Windows of ticks, `count` in all; the pieces begin at the first of them."""
+        period = self.system.tick_period(p)
+        done = 0
+        while done < count:
+            now = [piece.after(done * period) for piece in pieces]
+            good, window = self._ticks_that_hold(first + done, min(self.count, count - done), x, m, p, now)
+            if good:
+                done += good
+                yield window
+                x, m = window.end
+                continue
+            # these periods again one by one, looked at more closely
+            for _ in range(min(self.options.stride, count - done)):
+                begin = (first + done) * period
+                now = [piece.after(done * period) for piece in pieces]
+                x, m = self.tick(first + done, begin, x, m, np.array([piece(0.0) for piece in now]), p)
+                window = self.run(begin, period, x, m, p, now)
+                done += 1
+                yield window
+                x, m = window.end
+
+    def _ticks_that_hold(
+        self, first: int, count: int, x: np.ndarray, m: np.ndarray, p: np.ndarray, pieces: list[Piece]
+    ) -> tuple[int, Window]:
+        """As many of `count` ticks as went well, and their window."""
+        fine, stride, period = self.options.fine, self.options.stride, self.system.tick_period(p)
+        nothing = 0, Window(*(np.empty((0, 0)) for _ in ARRAYS), [], 0)
+        due = self.system.due(first + np.arange(self.count))
+        results, failure = _called(self._best(self.ticks), (x, m, p, due, period, self.form.coefficients(pieces)))
+        if failure:
+            return nothing
+        *seen, log, faults, ends, end_modes = results
+        counts, times, codes = np.split(log.reshape(-1, fine + 1, self.count, order="F"), [1, 1 + LOG_SLOTS])
+        happened = np.diff(np.round(counts[0]), axis=0).astype(int)  # (fine, ticks)
+        bad = (faults[0] > 0) | (happened > LOG_SLOTS).any(axis=0)
+        # a margin that is negative at an output point became so in the ticks before it
+        below = np.flatnonzero((seen[-1] < -VIOLATION).any(axis=0))
+        if below.size:
+            bad[max((below[0] - 1) // fine * stride, 0) :] = True
+        good = int(np.argmax(bad[:count])) if bad[:count].any() else count
+        if not good:
+            return nothing
+        starts, points = (first + np.arange(good)) * period, math.ceil(good / stride) * fine
+        u = np.array([piece(good * period) for piece in pieces])
+        state, mode = ends[:, good - 1], end_modes[:, good - 1]
+        end = [
+            state,
+            mode,
+            *(f(state, mode, u, p).full().ravel() for f in (self.system.outputs_function, self.system.margins)),
+        ]
+        if (end[-1] < -VIOLATION).any():
+            return nothing
+        present = codes[: self.code.size]
+        before = np.concatenate([self.code.packed(m)[:, None], present[:, -1, : good - 1]], axis=1)
+        jumps = (np.abs(present[:, 0, :good] - before) > 0.5).any(axis=0)  # noqa: PLR2004 - codes are whole numbers
+        events: list[tuple[float, tuple[int, ...]]] = []
+        for k in np.flatnonzero(jumps | happened[:, :good].any(axis=0)):
+            if jumps[k]:
+                events.append((starts[k], self.code.words(present[:, 0, k])))
+            for i in np.flatnonzero(happened[:, k]):
+                events += self._logged(starts[k], period, times[: happened[i, k], i + 1, k], codes[:, i + 1, k])
+        grid = np.append((starts[::stride, None] + period * np.arange(fine) / fine).ravel(), (first + good) * period)
+        columns = [np.column_stack([array[:, :points], last]) for array, last in zip(seen, end, strict=True)]
+        return good, Window(grid, *columns, events, 0)
+
+    def _best(self, pair: tuple[ca.Function, ca.Function | None]) -> ca.Function:
+        return pair[1] or pair[0]
+
     def run(
         self, time: float, length: float, x: np.ndarray, m: np.ndarray, p: np.ndarray, pieces: list[Piece]
     ) -> Window:
@@ -154,15 +315,16 @@ class Engine:
             return self.run(start, end - start, x, m, p, [piece.after(start - time) for piece in pieces])
 
         arguments = x, m, p, length, self.form.coefficients(pieces)
-        raw, failure = _called(self.window, arguments)
+        raw, failure = _called(self._best(self.window), arguments)
         if failure:
             if length / 2 < FINEST_WINDOW:
                 # compiled code fails without a word; the interpreter knows why
-                raise self._stopped(time, m, _called(self.interpreted, arguments)[1] or failure)
+                raise self._stopped(time, m, _called(self.window[0], arguments)[1] or failure)
             first = part(time, time + length / 2, x, m)
             return join([first, part(time + length / 2, time + length, *first.end)])
 
-        states, modes, count, times, codes, outputs, margins = raw
+        states, modes, outputs, margins, log = raw
+        count, times, codes = np.split(log, [1, 1 + LOG_SLOTS])
         grid = time + length * np.arange(INTERVALS + 1) / INTERVALS
         window = Window(grid, states, modes, outputs, margins, [], 0)
         missed = np.flatnonzero((margins < -VIOLATION).any(axis=0))

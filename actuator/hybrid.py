@@ -9,8 +9,12 @@ Event rules, stated once:
 3. Margins are dimensionless (a part of a usual speed, force or length) and stay positive by MARGIN_BAND
    where the physics has them at exactly zero, so that an engine which only sees sign changes can arm them.
 4. The system does not depend on time; inputs do.
+5. Sampled controllers are clocks of the same system. At a tick, all laws that are due run once, in one
+   function `tick` of what is measured then; what they hold between ticks are states without dynamics, the last ones of
+   x. Where a tick makes a margin negative, `reset` decides the modes, as at the start.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -24,11 +28,20 @@ MARGIN_BAND = 1e-10
 
 
 class Quantity(NamedTuple):
-    """A named signal with its unit and usual size."""
+    """A named signal with its unit and usual size; a state with where it begins, and whether it is held by a clock."""
 
     name: str
     unit: str
     nominal: float = 1.0
+    initial: float = 0.0
+    held: bool = False
+
+
+class Clock(NamedTuple):
+    """A sampled loop: due at every `every`-th tick of the system, the first time at time zero."""
+
+    name: str
+    every: int = 1
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -38,6 +51,7 @@ class HybridSystem:
         dx/dt = flow(x, m, u, p)
         margins(x, m, u, p)                      >= 0 while the modes m hold
         (x+, m+, fault) = reset(fired, x, m, u, p)    fault = 1 where no consistent modes were found
+        x+ = tick(due, x, m, u, p)                at the ticks, `period(p)` apart
         y = outputs(x, m, u, p)
 
     Attributes
@@ -56,6 +70,10 @@ class HybridSystem:
         Raises ValueError where changed parameters, by name, break a rule.
     flow, margins, reset, outputs_function : casadi.Function
         As above; `fired` is a vector with 1 at the margin that fired.
+    clocks : tuple of Clock
+        Sampled loops; none in continuous time.
+    tick, period : casadi.Function or None
+        As above; `due` is a vector with 1 at the clocks that are due. None without clocks.
     """
 
     name: str
@@ -71,6 +89,9 @@ class HybridSystem:
     reset: ca.Function
     outputs_function: ca.Function
     check: Callable[[Mapping[str, float]], None] | None = None
+    clocks: tuple[Clock, ...] = ()
+    tick: ca.Function | None = None
+    period: ca.Function | None = None
 
     def __post_init__(self) -> None:
         names = [quantity.name for quantity in (*self.states, *self.inputs, *self.outputs)]
@@ -79,6 +100,22 @@ class HybridSystem:
             raise ValueError(
                 f"HybridSystem {self.name}: signals share a name: {', '.join(twice)}; rename a shaft or an output"
             )
+        held = [quantity.held for quantity in self.states]
+        if held != sorted(held) or any(held) > bool(self.clocks):
+            raise ValueError(f"HybridSystem {self.name}: held states stand behind the others, and need a clock")
+
+    @property
+    def moving(self) -> int:
+        """How many states are continuous; the held ones follow."""
+        return sum(not quantity.held for quantity in self.states)
+
+    def tick_period(self, p: np.ndarray) -> float:
+        """Time [s] between two ticks; infinite without clocks."""
+        return math.inf if self.period is None else float(self.period(p))
+
+    def due(self, ticks: np.ndarray) -> np.ndarray:
+        """Which clocks (rows) are due at the ticks of these numbers (columns), 1 or 0."""
+        return np.array([ticks % clock.every == 0 for clock in self.clocks], dtype=float)
 
     def parameter_values(self, changes: Mapping[str, float] | None = None) -> np.ndarray:
         """Values of p: the defaults, with `changes` by name, held against the rules of their components."""
@@ -89,10 +126,10 @@ class HybridSystem:
         return np.array([float(changes.get(parameter.name, parameter.default)) for parameter in self.parameters])
 
     def state_vector(self, values: Mapping[str, float] | None = None) -> np.ndarray:
-        """A state vector x by name; states not named are zero."""
+        """A state vector x by name; states not named have their initial value."""
         values = values or {}
         require_known(values, [state.name for state in self.states], "state")
-        return np.array([float(values.get(state.name, 0.0)) for state in self.states])
+        return np.array([float(values.get(state.name, state.initial)) for state in self.states])
 
     def input_vector(self, values: Mapping[str, float] | None = None) -> np.ndarray:
         """An input vector u by name; inputs not named are zero."""

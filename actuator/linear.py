@@ -10,8 +10,8 @@ import control
 import numpy as np
 from scipy.optimize import brentq
 
-from actuator.actuator import PREFIX
 from actuator.hybrid import HybridSystem
+from actuator.ledger import PREFIX
 from actuator.parameters import require_known
 from actuator.trim import NoEquilibrium, OperatingPoint, rounding
 

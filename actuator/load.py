@@ -3,19 +3,45 @@
 from dataclasses import dataclass
 from typing import Annotated
 
+import casadi as ca
 from annotated_types import Ge, Unit
 
-from gear.quantities import Scalar, TorsionalDamping, check
+from gear.quantities import Angle, Scalar, TorsionalDamping, check
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gravity:
+    """Weight of an unbalanced load.
+
+        torque on the shaft = -moment sin(angle - hanging_angle)
+
+    Parameters
+    ----------
+    moment : float
+        Mass times gravity times distance of the center of gravity from the axis [N m].
+    hanging_angle : float
+        Angle of the shaft at which the center of gravity hangs below the axis [rad].
+    """
+
+    moment: Annotated[float, Unit("N m"), Ge(0)]
+    hanging_angle: Angle = 0.0
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    def torque(self, angle: Scalar) -> Scalar:
+        """Torque on the shaft [N m]."""
+        return -self.moment * ca.sin(angle - self.hanging_angle)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Load:
     """What is fixed to the output shaft: inertia, and torque over position and speed.
 
-        torque on the shaft = bias - stiffness * angle - damping * speed
+        torque on the shaft = bias - stiffness * angle - damping * speed + torque of gravity
 
     For a control surface, stiffness and damping are the aerodynamic hinge-moment derivatives and the bias
-    is the hinge moment at neutral position.
+    is the hinge moment at neutral position. A gust is a signal on the input `load_torque`.
 
     Parameters
     ----------
@@ -27,16 +53,28 @@ class Load:
         [N m s/rad].
     bias : float
         Torque at angle zero [N m]; positive turns the shaft in positive direction.
+    gravity : Gravity or None
+        Weight of an unbalanced load; None for a balanced one.
     """
 
     inertia: Annotated[float, Unit("kg m^2"), Ge(0)] = 0.0
     stiffness: Annotated[float, Unit("N m/rad")] = 0.0
     damping: TorsionalDamping = 0.0
     bias: Annotated[float, Unit("N m")] = 0.0
+    gravity: Gravity | None = None
 
     def __post_init__(self) -> None:
         check(self)
 
+    def inertia_at(self, angle: Scalar) -> Scalar:
+        """Inertia [kg m^2]; the same at every angle."""
+        return self.inertia
+
     def torque(self, angle: Scalar, speed: Scalar) -> Scalar:
         """Torque on the output shaft [N m]."""
-        return self.bias - self.stiffness * angle - self.damping * speed
+        aerodynamic = self.bias - self.stiffness * angle - self.damping * speed
+        return aerodynamic if self.gravity is None else aerodynamic + self.gravity.torque(angle)
+
+    def kinetic(self, angle: Scalar, speed: Scalar) -> Scalar:
+        """Kinetic energy [J]."""
+        return self.inertia * speed**2 / 2

@@ -1,7 +1,7 @@
 """From numbers to symbols: every float field of a component becomes a named CasADi parameter."""
 
 import difflib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields, is_dataclass, replace
 from typing import Any, NamedTuple, TypeVar
 
@@ -47,6 +47,31 @@ def _copy(part: Any, path: str, found: list[Parameter]) -> Any:
             value = _copy(value, name, found)
         object.__setattr__(copy, field.name, value)
     return copy
+
+
+def unchecked(kind: type[Component], **values: Any) -> Component:
+    """A component with expressions in its fields, which no rule can be held against."""
+    made = object.__new__(kind)
+    for field in fields(kind):  # pyright: ignore[reportArgumentType] - components are dataclasses
+        object.__setattr__(made, field.name, values[field.name])
+    return made
+
+
+def substituted(part: Any, change: Callable[[Any], Any], keep: Iterable[str] = ()) -> Any:
+    """A symbolic component with `change` made to every part of it that it is not None for, unchecked.
+
+    Fields named in `keep` stay as they are.
+    """
+    if isinstance(part, Mapping):
+        return {name: substituted(item, change, keep) for name, item in part.items()}
+    if not is_dataclass(part) or isinstance(part, type):
+        return part
+    changed = change(part)
+    if changed is not None:
+        return changed
+    old = {field.name: getattr(part, field.name) for field in fields(part)}
+    new = {name: value if name in keep else substituted(value, change, keep) for name, value in old.items()}
+    return unchecked(type(part), **new)
 
 
 def with_values(part: Any, path: str, values: Mapping[str, float]) -> Any:

@@ -101,10 +101,10 @@ class Run:
         inputs: Sequence["Signal"],
     ) -> "Run":
         """Name what the engine returned."""
-        from actuator.signals import piece_at
+        from actuator.signals import values_at
 
         signals = {
-            quantity.name: np.array([piece_at(signal, time)(0.0) for time in window.time])
+            quantity.name: values_at(signal, window.time)
             for quantity, signal in zip(system.inputs, inputs, strict=True)
         }
         signals |= {quantity.name: row for quantity, row in zip(system.states, window.states, strict=True)}

@@ -3,7 +3,9 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
 
 
 class Wave(NamedTuple):
@@ -38,13 +40,12 @@ class Piece(NamedTuple):
             ),
         )
 
-    def __call__(self, tau: float) -> float:
-        """Value at tau."""
-        return (
-            self.offset
-            + self.slope * tau
-            + sum(w.amplitude * math.sin(w.phase + w.frequency * tau + w.rate * tau**2 / 2) for w in self.waves)
-        )
+    def __call__(self, tau: Any) -> Any:
+        """Value at tau, a number or an array."""
+        value = self.offset + self.slope * tau
+        for wave in self.waves:
+            value = value + wave.amplitude * np.sin(wave.phase + wave.frequency * tau + wave.rate * tau**2 / 2)
+        return value
 
 
 class Signal(Protocol):
@@ -61,9 +62,32 @@ def piece_at(signal: "Signal", time: float) -> Piece:
     return piece.after(time - start) if math.isfinite(start) else piece
 
 
+def values_at(signal: "Signal", times: np.ndarray) -> np.ndarray:
+    """Values at ascending times (n,), just after each of them."""
+    pieces = signal.pieces()
+    found, belongs = np.empty_like(times), np.searchsorted([start for start, _ in pieces], times, side="right") - 1
+    for k in np.unique(belongs):
+        start, piece = pieces[k]
+        here = belongs == k
+        found[here] = piece(times[here] - start if math.isfinite(start) else np.zeros(here.sum()))
+    return found
+
+
 def break_points(signal: "Signal") -> list[float]:
     """Times at which the signal is not smooth."""
     return [start for start, _ in signal.pieces() if math.isfinite(start)]
+
+
+def bounds(signal: "Signal", end: float) -> tuple[float, float]:
+    """Values between which a signal stays from time zero to `end` [s]; waves count with their whole amplitude."""
+    starts = [0.0, *(time for time in break_points(signal) if 0 < time < end)]
+    low, high = math.inf, -math.inf
+    for start, stop in zip(starts, [*starts[1:], end], strict=True):
+        piece = piece_at(signal, start)
+        swing = sum(abs(wave.amplitude) for wave in piece.waves)
+        ends = (piece.offset, piece.offset + piece.slope * (stop - start))
+        low, high = min(low, min(ends) - swing), max(high, max(ends) + swing)
+    return low, high
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,6 +177,39 @@ class Chirp:
         return [
             (-math.inf, Piece(self.offset)),
             (self.time, Piece(self.offset, waves=(wave,))),
+            (self.time + self.duration, Piece(self.offset)),
+        ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gust:
+    """One-minus-cosine gust: `offset`, and from `time` [s] a single hump that lasts `duration` [s].
+
+        offset + amplitude/2 (1 - cos(2 pi (t - time) / duration))
+
+    A discrete gust of gradient distance H, flown through at speed V, lasts 2 H / V; its amplitude is the
+    hinge moment (or force) at the design gust velocity.
+
+    References
+    ----------
+    EASA CS-25, 25.341(a), the shape of the discrete gust.
+    """
+
+    amplitude: float
+    duration: float
+    time: float = 0.0
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.duration <= 0:
+            raise ValueError(f"Gust.duration must be > 0 s, got {self.duration:g} s")
+
+    def pieces(self) -> list[tuple[float, Piece]]:
+        """Constant, one wave about half the amplitude, constant."""
+        wave = Wave(self.amplitude / 2, -math.pi / 2, 2 * math.pi / self.duration)
+        return [
+            (-math.inf, Piece(self.offset)),
+            (self.time, Piece(self.offset + self.amplitude / 2, waves=(wave,))),
             (self.time + self.duration, Piece(self.offset)),
         ]
 

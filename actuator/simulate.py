@@ -16,6 +16,8 @@ from actuator.signals import Constant, Signal, break_points, piece_at
 from actuator.window import INTERVALS
 
 DEFAULT_POINTS = 2000
+ALMOST = 1 - 1e-12  # a ratio that is whole but for rounding
+MOST_TICKS = 20  # between two output points
 
 
 def simulate(  # noqa: PLR0913 - a simulation has this many choices, all but two with defaults
@@ -75,7 +77,18 @@ def simulate(  # noqa: PLR0913 - a simulation has this many choices, all but two
     signals = _signals(system, inputs or {})
     waves = {(wave.frequency, wave.rate) for signal in signals for _, piece in signal.pieces() for wave in piece.waves}
     x, p = system.state_vector(start), system.parameter_values(parameters)
-    machine = engine(system, EngineOptions(tolerance=tolerance, compiled=compiled, waves=len(waves)))
+    period = system.tick_period(p)
+    fine, stride = (
+        (1, 1) if math.isinf(period) else (math.ceil(period / resolution * ALMOST), int(resolution / period / ALMOST))
+    )
+    options = EngineOptions(
+        tolerance=tolerance,
+        compiled=compiled,
+        waves=len(waves),
+        fine=min(max(fine, 1), INTERVALS),
+        stride=min(max(stride, 1), MOST_TICKS),
+    )
+    machine = engine(system, options)
 
     began = clock.perf_counter()
     stops = sorted(
@@ -88,14 +101,12 @@ def simulate(  # noqa: PLR0913 - a simulation has this many choices, all but two
         x, settled = machine.settle(first, x, m, u, p)
         jump = [(first, tuple(int(mode) for mode in settled))] if first > 0 and not np.array_equal(settled, m) else []
         m = settled
-        count = math.ceil((last - first) / (INTERVALS * resolution) * (1 - 1e-12))
-        for k in range(count):
-            begin, end = (first + (last - first) * j / count for j in (k, k + 1))
-            window = machine.run(begin, end - begin, x, m, p, [piece_at(signal, begin) for signal in signals])
+        pieces = [piece_at(signal, first) for signal in signals]
+        for window in machine.advance(first, last, x, m, p, pieces, resolution):
             windows.append(window._replace(events=[*jump, *window.events]))
             (x, m), jump = window.end, []
             if progress is not None:
-                progress(end)
+                progress(window.time[-1])
     whole = join(windows)
     wall = clock.perf_counter() - began
     statistics = Statistics(

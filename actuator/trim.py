@@ -18,6 +18,7 @@ STEPS = 60  # Newton steps; the equations of a mode are nearly linear
 STILL = 1e-9  # rate of a state over its nominal size [1/s] that counts as zero
 ROUNDING, MOST_ROUNDING = 100 * np.finfo(float).eps, 1e-2
 HOLDS = -1e-6  # a margin below this does not hold
+STOPS = "gear.stops."  # what the flanks of end stops are called
 
 
 class NoEquilibrium(ValueError):
@@ -56,7 +57,7 @@ class OperatingPoint:
 
     @property
     def flanks(self) -> dict[str, int]:
-        """Flank of each mesh that has one, by contact."""
+        """Flank of each mesh, coupling and end stop that has one, by name."""
         named = zip(self.system.modes, self.m, strict=True)
         return {name.removesuffix(".flank"): int(mode) for name, mode in named if name.endswith(".flank")}
 
@@ -74,7 +75,7 @@ def modes_of(
 
     One word for all contacts is about the output: "stuck", or all contacts sliding as they do when the output
     moves "forward" or "backward" (some of them backward, then). Words per contact are about its own slip
-    speed. Flanks are +1 where not given.
+    speed. Flanks that are not given are +1, those of end stops 0.
     """
     names = contact_names(system.modes)
     if isinstance(contacts, str):
@@ -90,7 +91,26 @@ def modes_of(
     flank_names = [name for name in system.modes if name.endswith(".flank")]
     given = {f"{name}.flank": value for name, value in (flanks or {}).items()}
     require_known(given, flank_names, "flank")
-    return system.mode_vector(values | {name: given.get(name, 1) for name in flank_names})
+    return system.mode_vector(values | {name: given.get(name, _usual_flank(name)) for name in flank_names})
+
+
+def _usual_flank(name: str) -> int:
+    """Teeth and couplings transmit; an end stop is not touched."""
+    return 0 if name.startswith(STOPS) else 1
+
+
+def _turned(margins: Mapping[str, float], flanks: Mapping[str, int]) -> dict[str, int]:
+    """The other flank where the present one does not hold; of an end stop, the one that was passed or none."""
+    found = {}
+    for name, flank in flanks.items():
+        broken = [side for side, sign in ((1, "+"), (-1, "-")) if margins.get(f"{name} flank {sign}", 0.0) < 0]
+        if flank == 0:
+            found[name] = broken[0] if broken else 0
+        elif flank in broken or margins.get(f"{name} flank", 0.0) < 0:
+            found[name] = 0 if name.startswith(STOPS) else -flank
+        else:
+            found[name] = flank
+    return found
 
 
 def trim(  # noqa: PLR0913 - what may be held and where to start are all choices of the user
@@ -107,7 +127,7 @@ def trim(  # noqa: PLR0913 - what may be held and where to start are all choices
     In a sliding mode at speed zero, friction acts with its full sliding value in that direction: the limit
     from which the contact starts, or to which it comes. In a stuck mode many points are at rest; the one
     nearest to the guess is taken, or where no guess is given the one that forward motion leaves behind.
-    Flanks follow from the load.
+    Flanks follow from the load; for a point of rest against an end stop, give a guess beyond it.
 
     Parameters
     ----------
@@ -141,19 +161,18 @@ def trim(  # noqa: PLR0913 - what may be held and where to start are all choices
     scale = np.array([quantity.nominal for quantity in system.states])
     free = np.array([name not in drifting for name in names])
     flank_names = [name.removesuffix(".flank") for name in system.modes if name.endswith(".flank")]
-    flanks = dict.fromkeys(flank_names, 1) | flanks
+    usual = {name: _usual_flank(name) for name in flank_names}
+    at_guess = system.margins(x, modes_of(system, contacts, usual), u, p).full().ravel()
+    stops = {name: 0 for name in flank_names if name.startswith(STOPS)}
+    flanks = usual | _turned(dict(zip(system.margin_names, at_guess, strict=True)), stops) | flanks
     for _ in range(2 + len(flanks)):
         m = modes_of(system, contacts, flanks)
         x, rates = _newton(system, x, m, u, p, scale, free)
-        forces = dict(
-            zip([q.name for q in system.outputs], system.outputs_function(x, m, u, p).full().ravel(), strict=True)
-        )
-        found = {name: -1 if flanks[name] * forces[f"{name}.normal_force"] < 0 else 1 for name in flanks}
-        found = {name: flanks[name] * keeps for name, keeps in found.items()}
+        margins = system.margins(x, m, u, p).full().ravel()
+        found = _turned(dict(zip(system.margin_names, margins, strict=True)), flanks)
         if found == flanks:
             break
         flanks = found
-    margins = system.margins(x, m, u, p).full().ravel()
     if margins.size and margins.min() < HOLDS:
         m, held = _held_by_others(system, x, m, u, p)
         margins = np.zeros(1) if held else margins

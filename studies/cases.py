@@ -1,20 +1,26 @@
 """Cases: an actuator with a scenario to run it through, built in or from a file."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Annotated, Any
 
 from annotated_types import Gt, Unit
 
 from actuator.actuator import Actuator
+from actuator.current_source import CurrentSource
+from actuator.dc_link import DCLink
 from actuator.inverter import Inverter
+from actuator.linear_load import LinearLoad
 from actuator.load import Load
 from actuator.motor import PMSM, DCMotor, TorqueSource
 from actuator.parameters import require_known
+from actuator.sensors import Sensors
 from actuator.signals import Signal
+from actuator.thermal import ThermalNetwork
 from controllers.cascade import Cascade
 from controllers.pid import PID
+from controllers.sampling import Sampling
 from gear.quantities import check
 from gear.transmission import Transmission
 from studies.converter import SIGNALS
@@ -75,23 +81,21 @@ class Document:
 
     title: str
     description: str = ""
-    motor: TorqueSource | DCMotor | PMSM
+    motor: TorqueSource | CurrentSource | DCMotor | PMSM
     inverter: Inverter | None = None
+    link: DCLink | None = None
     gear: Transmission
-    load: Load = field(default_factory=Load)
+    load: Load | LinearLoad = field(default_factory=Load)
     controller: PID | Cascade | None = None
+    sampling: Sampling | None = None
+    sensors: Sensors = field(default_factory=Sensors)
+    thermal: ThermalNetwork | None = None
     scenario: Scenario
 
     def actuator(self, name: str) -> Actuator:
         """The parts as one actuator; ValueError where they do not go together."""
-        return Actuator(
-            name=name,
-            motor=self.motor,
-            inverter=self.inverter,
-            gear=self.gear,
-            load=self.load,
-            controller=self.controller,
-        )
+        parts = {part.name: getattr(self, part.name) for part in fields(Actuator) if part.name != "name"}
+        return Actuator(name=name, **parts)
 
 
 def built_in() -> list[str]:

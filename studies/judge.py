@@ -17,7 +17,7 @@ from actuator import (
     simulate,
     trim,
 )
-from actuator.actuator import PREFIX
+from actuator.ledger import PREFIX
 from actuator.signals import piece_at
 from studies.cases import Case
 

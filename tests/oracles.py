@@ -7,8 +7,9 @@ import numpy as np
 from hypothesis import reject
 from hypothesis import strategies as st
 
+from gear.elastic_law import AT_REST
 from gear.geometry import ExternalPair
-from gear.motion import MeshMotion, Sliding
+from gear.motion import Sliding
 
 PAPER_PAIR = ExternalPair(teeth_a=20, teeth_b=60, module=1e-3)  # 10/30 mm, tips 11/31 mm: van der Linden, Table 3
 
@@ -41,12 +42,12 @@ def external_pairs(draw):
 
 def pressed(deflection, rate=0.0):
     """Motion of a mesh that is bent, and nothing else."""
-    return MeshMotion(*(0.0 for _ in MeshMotion._fields))._replace(deflection=deflection, rate=rate)
+    return AT_REST._replace(deflection=deflection, rate=rate)
 
 
 def rubbing(speed, force):
     """A mesh that slides at the pitch point's first position, wheel A driving."""
-    return Sliding(*(0.0 for _ in Sliding._fields))._replace(speed=speed, force=force, a_drives=1.0)
+    return Sliding(speed=speed, force=force, a_drives=1.0, position=0.0, pair=PAPER_PAIR)
 
 
 def in_symbols(function, *values):

@@ -212,10 +212,64 @@ def test_a_unit_suffix_converts_to_si(load, si, other):
         ("mm", 1000),
         ("gcm2", 1000 * 100**2),
         ("kgcm2", 100**2),
+        ("mPas", 1000),
+        ("mm2_per_s", 1000**2),
     ],
 )
 def test_how_many_make_one_si_unit(unit, count):
     assert SUFFIXES[unit].count == pytest.approx(count, rel=1e-14)
+
+
+OILY = """
+friction = { type = "Din3990", static = 0.2, roughness_um = 0.8, face_width_mm = 10, lubricant = LUBRICANT }
+elasticity"""
+KNOWN_OIL = '{ type = "OilAt", oil = { type = "KnownOil", name = "Mobil Jet Oil II" }, TEMPERATURE }'
+GIVEN_OIL = """{
+    type = "OilAt",
+    temperature_degC = 70,
+    oil = { type = "Oil", density = 900, density_temperature_degC = 15, expansion = 8e-4, lowest_degC = -40,
+        highest_degC = 120, law = { type = "Walther", cold_temperature_degC = 40, cold_viscosity_mm2_per_s = 100,
+        hot_temperature_degC = 100, hot_viscosity_mm2_per_s = 11 } } }"""
+
+
+def oily(lubricant):
+    """The smallest file with a friction law that has an oil."""
+    with_law = edited('friction = { type = "Coulomb", sliding = 0.1, static = 0.2 }\n', "", SMALL)
+    return edited("elasticity", OILY.strip("\n").replace("LUBRICANT", " ".join(lubricant.split())), with_law)
+
+
+@pytest.mark.parametrize(("celsius", "kelvin"), [("-55", 218.15), ("20", 293.15), ("70.0", 343.15)])
+def test_degrees_celsius_are_counted_from_where_water_freezes(load, celsius, kelvin):
+    case = load(oily(KNOWN_OIL.replace("TEMPERATURE", f"temperature_degC = {celsius}")))
+    lubricant = case.actuator.gear.meshes["only"].friction.lubricant
+    assert lubricant.temperature == pytest.approx(kelvin, rel=1e-15)
+    assert lubricant.dynamic_viscosity() > 0
+
+
+def test_an_oil_of_ones_own_is_written_as_its_data_sheet_has_it(load):
+    oil = load(oily(GIVEN_OIL)).actuator.gear.meshes["only"].friction.lubricant.oil
+    assert (oil.lowest, oil.highest, oil.density_temperature) == pytest.approx((233.15, 393.15, 288.15))
+    assert (oil.law.cold_viscosity, oil.law.hot_viscosity) == (100e-6, 11e-6)
+    assert oil.kinematic_viscosity(313.15) == pytest.approx(100e-6)
+
+
+@pytest.mark.parametrize(
+    ("temperature", "message"),
+    [
+        ("temperature_degC = 200", "temperature must be from 218.15 K to 423.15 K, got 473.15 K"),
+        ("temperature_degC = -300", "temperature_degC = -300 must be > 0 K, got -26.85 K"),
+        (
+            "temperature_deg = 20",
+            "has a suffix for rad, but temperature is in K; allowed: temperature, temperature_degC",
+        ),
+        (
+            "temperature = 293.15, temperature_degC = 20",
+            "is given more than once, as temperature and as temperature_degC",
+        ),
+    ],
+)
+def test_temperatures_that_cannot_be_are_refused(refusal, temperature, message):
+    assert message in refusal(oily(KNOWN_OIL.replace("TEMPERATURE", temperature)))
 
 
 DEGREE = math.pi / 180
@@ -339,9 +393,9 @@ WRONG = [
     ),
     ("[scenario.inputs.reference]", '[scenario.inputs."ref rence"]', 'scenario.inputs."ref rence" is not allowed'),
     # an unknown or missing type
-    ('type = "PMSM"', 'type = "PMSN"', 'motor.type = "PMSN" must be one of TorqueSource, DCMotor, PMSM'),
-    ('type = "PMSM"', "type = 3", "motor.type = 3 must be one of TorqueSource, DCMotor, PMSM"),
-    ('type = "PMSM"', "", "motor.type is missing; it must be one of TorqueSource, DCMotor, PMSM"),
+    ('type = "PMSM"', 'type = "PMSN"', 'motor.type = "PMSN" must be one of TorqueSource, CurrentSource, DCMotor, PMSM'),
+    ('type = "PMSM"', "type = 3", "motor.type = 3 must be one of TorqueSource, CurrentSource, DCMotor, PMSM"),
+    ('type = "PMSM"', "", "motor.type is missing; it must be one of TorqueSource, CurrentSource, DCMotor, PMSM"),
     (
         'friction = { type = "Coulomb", sliding',
         'friction = { type = "Dahl", sliding',

@@ -1,7 +1,7 @@
 """One actuator: motor, inverter, controller, gear and load, composed into a HybridSystem."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -11,6 +11,7 @@ from actuator.contacts import ContactMechanics
 from actuator.current_source import CurrentSource
 from actuator.dc_link import DCLink
 from actuator.drive import ANGLE, Motion, Site, cascade_drive, loops_of, open_drive, pid_drive
+from actuator.fitting import require_fitting
 from actuator.heat import Heat
 from actuator.hybrid import Clock, HybridSystem
 from actuator.inverter import Inverter
@@ -30,6 +31,7 @@ from gear.transmission import Transmission
 SPEED = 0.1  # rad/s, a usual size
 PARTS = ("controller", "sampling", "sensors", "link", "inverter", "motor", "thermal", "gear", "load")
 SAME_RATIO = 1e-9
+SHARED = {"cse": True}  # what several laws work out is worked out once: a fifth of all operations
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,8 +42,10 @@ class Actuator:
     is that of the gear's output shaft. Without a controller the motor torque is an input.
 
     Inputs
-        reference            position reference [rad], with a controller
+        reference            position reference [rad], with a position controller
+        speed_reference      motor speed reference [rad/s], with a Cascade that has no position law
         torque_reference     motor torque demand [N m], without one
+        motor_angle_error    added to the measured angle of the motor [rad], with a Cascade: noise as a signal
         load_torque          torque on the output shaft [N m]
         load_force           force on the rod of a LinearLoad [N]
         inject.<signal>      added to a signal of the loop: position, speed_reference, torque_reference,
@@ -61,7 +65,7 @@ class Actuator:
     link : DCLink or None
         The voltage of the inverter as a state; None for a constant one.
     controller : PID, Cascade or None
-        Position controller.
+        Position controller, or with a Cascade that has no position law the speed controller.
     sampling : Sampling or None
         Periods at which the loops of the controller run; None in continuous time, for design.
     sensors : Sensors
@@ -89,8 +93,7 @@ class Actuator:
     name: str = "actuator"
 
     def __post_init__(self) -> None:
-        _require_drive(self)
-        _require_sampling(self)
+        require_fitting(self)
 
     def system(self) -> HybridSystem:
         """The actuator as a HybridSystem, every number a named parameter."""
@@ -107,53 +110,6 @@ class Actuator:
         return self is other
 
 
-def _require_drive(actuator: Actuator) -> None:
-    """Raise where motor, inverter and controller do not go together."""
-    controller, kind = actuator.controller, type(actuator.motor).__name__
-    if isinstance(actuator.motor, DCMotor | PMSM):
-        if not (actuator.inverter and isinstance(controller, Cascade) and controller.current):
-            raise ValueError(
-                f"Actuator: a {kind} needs an inverter and a Cascade as controller, whose current loop drives it"
-            )
-    elif actuator.inverter or actuator.link or (isinstance(controller, Cascade) and controller.current):
-        raise ValueError(
-            f"Actuator: a {kind} has no voltage: leave inverter, link and the current loop of a Cascade out"
-        )
-    if isinstance(actuator.motor, CurrentSource) and not isinstance(controller, Cascade):
-        raise ValueError(f"Actuator: a {kind} needs a Cascade as controller, with current = None")
-    if isinstance(controller, Cascade) and controller.current_demand != "quadrature":
-        if not isinstance(actuator.motor, PMSM):
-            raise ValueError(f'Actuator: current_demand "{controller.current_demand}" is for a PMSM, not for a {kind}')
-
-
-def _require_sampling(actuator: Actuator) -> None:
-    """Raise where what needs samples has none, or other ones."""
-    controller, sampling = actuator.controller, actuator.sampling
-    remedies = controller.remedies if isinstance(controller, Cascade) else None
-    if sampling is None:
-        for name in ("motor", "load", "current"):
-            sensor = getattr(actuator.sensors, name)
-            if sensor is not None and (sensor.memory() or sensor.resolution is not None):
-                raise ValueError(
-                    f"Actuator.sensors.{name}: resolution, noise and delay need a sampled controller: give the "
-                    "actuator a sampling, or leave them out"
-                )
-        if remedies is not None and remedies.knocker is not None:
-            raise ValueError("Actuator: a Knocker needs a sampled controller: give the actuator a sampling")
-        return
-    current = isinstance(controller, Cascade) and controller.current
-    needed = {PID: ("position",), Cascade: LOOPS if current else LOOPS[1:]}.get(type(controller), ())
-    present = tuple(name for name in LOOPS if getattr(sampling, name) is not None)
-    if present != needed:
-        raise ValueError(
-            f"Actuator.sampling must have the periods of the loops of its controller "
-            f"({', '.join(needed) or 'there is none'}), got {', '.join(present)}"
-        )
-    for law in (remedies.dither, remedies.knocker) if remedies and sampling.speed else ():
-        if law is not None:
-            law.check_period(sampling.speed)
-
-
 class _Assembly:
     """One pass through the actuator in the direction of power flow."""
 
@@ -163,10 +119,8 @@ class _Assembly:
         for name in PARTS:
             parts[name], found = parameterize(getattr(actuator, name), name)
             parameters += found
-        if actuator.link is not None:
-            parts["link_start"] = actuator.link.source_voltage
         book = Ledger()
-        heat = Heat(book, parts["thermal"], actuator.thermal)
+        heat = Heat(book, parts["thermal"])
         gear: Transmission = heat.oiled(parts["gear"])
         kinematics = actuator.gear.kinematics(gear)
         symbols = [
@@ -191,9 +145,8 @@ class _Assembly:
             parts=parts,
             motion=motion,
             loops=loops,
-            sensors=actuator.sensors,
             temperature=heat.of_motor(),
-            housing=heat.of_housing(),
+            oil=heat.of_oil(),
         )
         drive = {PID: pid_drive, Cascade: cascade_drive}.get(type(parts["controller"]), open_drive)
         torque = dict.fromkeys(gear.shafts, ca.SX(0))
@@ -231,25 +184,26 @@ class _Assembly:
             margin_names=tuple(contacts.margin_names()),
             parameters=tuple(parameters),
             travel=_travel(actuator.gear),
-            flow=ca.Function("flow", arguments, [book.flow()]),
-            margins=ca.Function("margins", arguments, [contacts.margins(forces, modes)]),
+            flow=ca.Function("flow", arguments, [book.flow()], SHARED),
+            margins=ca.Function("margins", arguments, [contacts.margins(forces, modes)], SHARED),
             reset=_whole_reset(settle, arguments, [state.name for state in book.states], list(symbols[1].values())),
             check=lambda values: _check_values(actuator, values),
-            outputs_function=ca.Function("outputs", arguments, [book.y()]),
+            outputs_function=ca.Function("outputs", arguments, [book.y()], SHARED),
             clocks=clocks,
             tick=ca.Function("tick", [due, *arguments], [book.after_tick()]) if clocks else None,
             period=ca.Function("period", arguments[3:], [parts["sampling"].base]) if clocks else None,
+            begin=book.begin(arguments[3]),
         )
 
     def _load_torque(self, book: Ledger, load: Any, motion: Motion) -> ca.SX:
         """Of the load itself and from outside, as a torque on the output shaft."""
-        outside = book.input("load_torque", "N m")
-        if not isinstance(load, LinearLoad):
-            return load.torque(motion.load_angle, motion.load_speed) + outside
-        force = book.input("load_force", "N")
-        book.output("rod_position", "m", load.position(motion.load_angle))
-        book.output("rod_speed", "m/s", load.speed(motion.load_angle, motion.load_speed))
-        return load.torque(motion.load_angle, motion.load_speed, force) + outside
+        at, outside = (motion.load_angle, motion.load_speed), book.input("load_torque", "N m")
+        force = (book.input("load_force", "N"),) if isinstance(load, LinearLoad) else ()
+        if isinstance(load, LinearLoad):
+            book.output("rod_position", "m", load.position(motion.load_angle))
+            book.output("rod_speed", "m/s", load.speed(*at))
+        book.output("load_power", "W", load.power(*at, *force) - outside * motion.load_speed)
+        return load.torque(*at, *force) + outside
 
 
 def _whole_reset(settle: ca.Function, arguments: list[ca.SX], states: list[str], speeds: list[ca.SX]) -> ca.Function:
@@ -269,14 +223,13 @@ def _clocks(sampling: Sampling | None) -> tuple[Clock, ...]:
 
 def _check_values(actuator: Actuator, values: Mapping[str, float]) -> None:
     """Raise where parameters break a rule, or change what the model was built on."""
-    parts = {name: with_values(getattr(actuator, name), name, values) for name in PARTS}
-    clocks = _clocks(parts["sampling"])
-    if clocks != _clocks(actuator.sampling):
+    changed = replace(actuator, **{name: with_values(getattr(actuator, name), name, values) for name in PARTS})
+    if _clocks(changed.sampling) != _clocks(actuator.sampling):
         raise ValueError(
             f"{actuator.name}: these periods change how many ticks lie between the samples of a loop, on which "
             "the model is built; change all periods by the same factor, or make a new Actuator"
         )
-    before, after = actuator.gear.ratio(), parts["gear"].ratio()
+    before, after = actuator.gear.ratio(), changed.gear.ratio()
     if abs(after - before) > SAME_RATIO * abs(before):
         raise ValueError(
             f"{actuator.name}: these parameters change the gear ratio from {before:.6g} to {after:.6g}, on which the "

@@ -264,8 +264,10 @@ class Engine:
     ) -> tuple[int, Window]:
         """As many of `count` ticks as went well, and their window."""
         fine, stride, period = self.options.fine, self.options.stride, self.system.tick_period(p)
-        nothing = 0, Window(*(np.empty((0, 0)) for _ in ARRAYS), [], 0)
+        none = np.empty((0, 0))
+        nothing = 0, Window(none, none, none, none, none, [], 0)
         due = self.system.due(first + np.arange(self.count))
+        due[:, count:] = -1
         results, failure = _called(self._best(self.ticks), (x, m, p, due, period, self.form.coefficients(pieces)))
         if failure:
             return nothing
@@ -292,7 +294,8 @@ class Engine:
             return nothing
         present = codes[: self.code.size]
         before = np.concatenate([self.code.packed(m)[:, None], present[:, -1, : good - 1]], axis=1)
-        jumps = (np.abs(present[:, 0, :good] - before) > 0.5).any(axis=0)  # noqa: PLR2004 - codes are whole numbers
+        # codes are whole numbers
+        jumps = np.abs(present[:, 0, :good] - before).max(axis=0, initial=0.0) > 0.5  # noqa: PLR2004
         events: list[tuple[float, tuple[int, ...]]] = []
         for k in np.flatnonzero(jumps | happened[:, :good].any(axis=0)):
             if jumps[k]:
@@ -300,8 +303,10 @@ class Engine:
             for i in np.flatnonzero(happened[:, k]):
                 events += self._logged(starts[k], period, times[: happened[i, k], i + 1, k], codes[:, i + 1, k])
         grid = np.append((starts[::stride, None] + period * np.arange(fine) / fine).ravel(), (first + good) * period)
-        columns = [np.column_stack([array[:, :points], last]) for array, last in zip(seen, end, strict=True)]
-        return good, Window(grid, *columns, events, 0)
+        state, mode, output, margin = (
+            np.column_stack([array[:, :points], last]) for array, last in zip(seen, end, strict=True)
+        )
+        return good, Window(grid, state, mode, output, margin, events, 0)
 
     def _best(self, pair: tuple[ca.Function, ca.Function | None]) -> ca.Function:
         return pair[1] or pair[0]

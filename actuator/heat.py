@@ -19,23 +19,25 @@ NODES = {
     "iron": ("stator", "housing"),
     "drag": ("housing",),
     "friction": ("oil", "housing"),
+    "damping": ("oil", "housing"),
     "inverter": ("inverter",),
+    "chopper": ("chopper",),
 }
 
 
 class Heat:
     """The network of one actuator while it is put together; without one, nothing depends on temperature.
 
-    Nodes are known by their names: winding, magnet (else stator, else housing), stator, housing, oil, inverter. A node
-    that is not there neither heats nor is heated.
+    Nodes are known by their names: winding, magnet (else stator, else housing), stator, housing, oil, inverter,
+    chopper. A node that is not there neither heats nor is heated.
     """
 
-    def __init__(self, book: Ledger, network: ThermalNetwork | None, numbers: ThermalNetwork | None) -> None:
+    def __init__(self, book: Ledger, network: ThermalNetwork | None) -> None:
         self.book, self.network = book, network
         self.at: dict[str, Scalar] = {}
-        if network is not None and numbers is not None:
+        if network is not None:
             states = {
-                name: book.state(f"thermal.{name}", "K", WARM, initial=numbers.nodes[name].temperature)
+                name: book.state(f"thermal.{name}", "K", WARM, initial=network.nodes[name].temperature)
                 for name in network.free
             }
             self.at = network.all_temperatures(states)
@@ -48,9 +50,9 @@ class Heat:
         winding, magnet = self._of("winding", "housing"), self._of("magnet", "stator", "housing")
         return None if winding is None or magnet is None else MotorTemperature(winding, magnet)
 
-    def of_housing(self) -> Scalar | None:
-        """For what depends on one temperature of the actuator."""
-        return self._of("housing", "oil")
+    def of_oil(self) -> Scalar | None:
+        """Of the oil, or else of the housing it is in."""
+        return self._of("oil", "housing")
 
     def oiled(self, gear: Any) -> Any:
         """The gear with its oils at the temperature of the network's oil, where it has that node."""

@@ -74,6 +74,8 @@ class HybridSystem:
         Sampled loops; none in continuous time.
     tick, period : casadi.Function or None
         As above; `due` is a vector with 1 at the clocks that are due. None without clocks.
+    begin : casadi.Function or None
+        (x, p) -> x with the states where they begin that follow other states or parameters; None where none does.
     """
 
     name: str
@@ -92,6 +94,7 @@ class HybridSystem:
     clocks: tuple[Clock, ...] = ()
     tick: ca.Function | None = None
     period: ca.Function | None = None
+    begin: ca.Function | None = None
 
     def __post_init__(self) -> None:
         names = [quantity.name for quantity in (*self.states, *self.inputs, *self.outputs)]
@@ -125,11 +128,15 @@ class HybridSystem:
             self.check(changes)
         return np.array([float(changes.get(parameter.name, parameter.default)) for parameter in self.parameters])
 
-    def state_vector(self, values: Mapping[str, float] | None = None) -> np.ndarray:
-        """A state vector x by name; states not named have their initial value."""
+    def state_vector(self, values: Mapping[str, float] | None = None, p: np.ndarray | None = None) -> np.ndarray:
+        """A state vector x by name; states not named are where they begin, with parameters p or the default ones."""
         values = values or {}
         require_known(values, [state.name for state in self.states], "state")
-        return np.array([float(values.get(state.name, state.initial)) for state in self.states])
+        x = np.array([float(values.get(state.name, state.initial)) for state in self.states])
+        if self.begin is None:
+            return x
+        begun = self.begin(x, self.parameter_values() if p is None else p).full().ravel()
+        return np.array([values.get(state.name, value) for state, value in zip(self.states, begun, strict=True)])
 
     def input_vector(self, values: Mapping[str, float] | None = None) -> np.ndarray:
         """An input vector u by name; inputs not named are zero."""

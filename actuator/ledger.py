@@ -27,6 +27,7 @@ class Ledger:
         self._rates: dict[str, ca.SX] = {}
         self._ticks: dict[str, ca.SX] = {}
         self._forward: dict[str, ca.SX] = {}  # held states asked for before they are declared
+        self._begins: dict[str, ca.SX] = {}  # where states begin that follow others, or a parameter
 
     def state(  # noqa: PLR0913 - all that a state has
         self,
@@ -34,12 +35,19 @@ class Ledger:
         unit: str,
         nominal: float = 1.0,
         *,
-        initial: float = 0.0,
+        initial: Scalar = 0.0,
         held: bool = False,
         symbol: ca.SX | None = None,
     ) -> ca.SX:
-        """Declare a state: continuous, or held between ticks; `symbol` where it has one already."""
+        """Declare a state: continuous, or held between ticks; `symbol` where it has one already.
+
+        It begins at a number, or at an expression of parameters, angles and states declared before it.
+        """
         symbol = self._forward.get(name, ca.SX.sym(name)) if symbol is None else symbol
+        if isinstance(initial, ca.SX):
+            known = ca.vertcat(ca.SX(0, 1), *(self._states[other][1] for other in self._begins))
+            self._begins[name] = ca.substitute(initial, known, ca.vertcat(ca.SX(0, 1), *self._begins.values()))
+            initial = 0.0
         self._states[name] = (Quantity(name, unit, nominal, initial, held), symbol)
         return symbol
 
@@ -94,6 +102,13 @@ class Ledger:
         """Time derivatives of the states; what is held does not move."""
         return ca.vertcat(*(0 if state.held else self._rates[state.name] for state in self.states))
 
+    def begin(self, p: ca.SX) -> ca.Function | None:
+        """(x, p) -> x with the states where they begin that follow others, inputs at zero; None where none does."""
+        if not self._begins:
+            return None
+        begun = [self._begins.get(state.name, self._states[state.name][1]) for state in self.states]
+        return ca.Function("begin", [self.x(), p], [ca.substitute(ca.vertcat(*begun), self.u(), 0 * self.u())])
+
     def after_tick(self) -> ca.SX:
         """The states after a tick; what is continuous stays as it is."""
         return ca.vertcat(*(self._ticks.get(state.name, self._states[state.name][1]) for state in self.states))
@@ -126,7 +141,7 @@ class Loop:
         """Whether the loop runs at ticks."""
         return self.due is not None
 
-    def state(self, name: str, unit: str, nominal: float = 1.0, initial: float = 0.0) -> ca.SX:
+    def state(self, name: str, unit: str, nominal: float = 1.0, initial: Scalar = 0.0) -> ca.SX:
         """What a law keeps in mind."""
         return self.ledger.state(name, unit, nominal, initial=initial, held=self.sampled)
 
@@ -164,9 +179,10 @@ class Loop:
 
     def delayed(self, name: str, unit: str, computed: Scalar) -> ca.SX:
         """A result as the plant sees it between ticks, `delay` ticks after its sample."""
+        due = ca.SX(1) if self.due is None else self.due
         for k in range(self.delay):
             before = self.ledger.state(f"{name}.pending_{k + 1}", unit, held=True)
-            self.ledger.tick(f"{name}.pending_{k + 1}", ca.if_else(self.due, computed, before))
+            self.ledger.tick(f"{name}.pending_{k + 1}", ca.if_else(due, computed, before))
             computed = before
         return self.hold(name, unit, computed)[1]
 
@@ -179,9 +195,17 @@ class Loop:
         self.ledger.tick(name, now)
         return now, standing
 
-    def memory(self, path: str, law: Any, *kind: Any) -> list[ca.SX]:
-        """Declare what a law with memory keeps in mind; `kind` is what its declaration asks for."""
-        return [self.state(f"{path}.{kept.name}", *kept[1:]) for kept in law.memory(*kind)]
+    def memory(self, path: str, law: Any, *kind: Any, first: Scalar = 0.0) -> list[ca.SX]:
+        """Declare what a law with memory keeps in mind; `kind` is what its declaration asks for.
+
+        The first of it begins at `first`: a position that is followed, where it is.
+        """
+        places = [kept if k else kept._replace(initial=first) for k, kept in enumerate(law.memory(*kind))]
+        return [self.state(f"{path}.{kept.name}", *kept[1:]) for kept in places]
+
+    def output(self, law: Any, memory: Sequence[ca.SX], *inputs: Scalar) -> Scalar:
+        """The value of a law with memory, in the form of this loop."""
+        return law.output(memory, *inputs, period=self.period)
 
     def remember(self, law: Any, memory: Sequence[ca.SX], *inputs: Scalar) -> None:
         """How the memory of a law goes on."""

@@ -61,6 +61,10 @@ class LinearLoad:
         pushed = self._force(angle, speed) + outside
         return travel.slope * (pushed - self.mass * travel.curvature * speed**2)
 
+    def power(self, angle: Scalar, speed: Scalar, outside: Scalar = 0.0) -> Scalar:
+        """Taken by what acts on the rod, its mass not counted [W], with a force [N] on the rod from outside."""
+        return -(self._force(angle, speed) + outside) * self.speed(angle, speed)
+
     def kinetic(self, angle: Scalar, speed: Scalar) -> Scalar:
         """Kinetic energy [J]."""
         return self.mass * self.speed(angle, speed) ** 2 / 2

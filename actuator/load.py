@@ -75,6 +75,10 @@ class Load:
         aerodynamic = self.bias - self.stiffness * angle - self.damping * speed
         return aerodynamic if self.gravity is None else aerodynamic + self.gravity.torque(angle)
 
+    def power(self, angle: Scalar, speed: Scalar) -> Scalar:
+        """Taken by what acts on the load, its inertia not counted [W]."""
+        return -self.torque(angle, speed) * speed
+
     def kinetic(self, angle: Scalar, speed: Scalar) -> Scalar:
         """Kinetic energy [J]."""
         return self.inertia * speed**2 / 2

@@ -76,6 +76,7 @@ def observe(book: Ledger, seen: Mechanics, motion: Motion) -> None:
         book.output(f"{path}.bearing_force_y", "N", bearing.y)
     for path, passed in forces.passed.items():
         book.output(f"gear.{path}.torque", "N m", passed)
+        book.output(f"gear.{path}.twist", "rad", forces.twists[path].angle)
     book.output("mechanical_energy", "J", seen.energy())
     for name, loss in seen.losses().items():
         book.output(f"{name}_loss", "W", loss)

@@ -12,8 +12,8 @@ from typing import Annotated, Any
 import casadi as ca
 from annotated_types import Ge, Gt, Unit
 
-from controllers.memory import Memory
 from actuator.noise import WhiteNoise
+from controllers.memory import Memory
 from gear.quantities import Angle, Scalar, check, check_count
 
 ANGLE, CURRENT = 1e-4, 1.0  # usual sizes, for the error control

@@ -3,6 +3,8 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -214,6 +216,14 @@ class Gust:
         ]
 
 
+def _require_points(signal: "Table | Staircase") -> None:
+    name, times, values = type(signal).__name__, signal.times, signal.values
+    if len(times) != len(values) or not times:
+        raise ValueError(f"{name} needs as many values as times, got {len(values)} and {len(times)}")
+    if any(late <= early for early, late in pairwise(times)):
+        raise ValueError(f"{name}.times must increase from point to point, got {times}")
+
+
 @dataclass(frozen=True, kw_only=True)
 class Table:
     """Straight lines through the points (times [s], values); constant before the first and after the last."""
@@ -222,10 +232,7 @@ class Table:
     values: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        if len(self.times) != len(self.values) or not self.times:
-            raise ValueError(f"Table needs as many values as times, got {len(self.values)} and {len(self.times)}")
-        if any(late <= early for early, late in zip(self.times, self.times[1:], strict=False)):
-            raise ValueError(f"Table.times must increase from point to point, got {self.times}")
+        _require_points(self)
 
     def pieces(self) -> list[tuple[float, Piece]]:
         """A constant, a line per interval, a constant."""
@@ -235,6 +242,26 @@ class Table:
             found.append((t0, Piece(v0, (v1 - v0) / (t1 - t0))))
         found.append((self.times[-1], Piece(self.values[-1])))
         return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class Staircase:
+    """Each value from its time [s] until the next one, the last for ever; the first also before."""
+
+    times: tuple[float, ...]
+    values: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        _require_points(self)
+
+    def pieces(self) -> list[tuple[float, Piece]]:
+        """Constants."""
+        return self._constants
+
+    @cached_property
+    def _constants(self) -> list[tuple[float, Piece]]:
+        starts = (-math.inf, *self.times[1:])
+        return [(start, Piece(value)) for start, value in zip(starts, self.values, strict=True)]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,10 +9,11 @@ import numpy as np
 
 from actuator.actuator import Actuator
 from actuator.engine import EngineOptions, Window, engine, join
+from actuator.fitting import require_within_stops
 from actuator.hybrid import HybridSystem
-from actuator.parameters import require_known
+from actuator.parameters import require_known, with_values
 from actuator.run import Run, Statistics
-from actuator.signals import Constant, Signal, break_points, piece_at
+from actuator.signals import Constant, Signal, bounds, break_points, piece_at
 from actuator.window import INTERVALS
 
 DEFAULT_POINTS = 2000
@@ -43,7 +44,8 @@ def simulate(  # noqa: PLR0913 - a simulation has this many choices, all but two
     inputs : mapping of str to Signal or float
         By name; inputs not named are zero.
     start : mapping of str to float
-        Initial states by name; states not named are zero. Modes follow from them.
+        Initial states by name; of the others, what follows an angle begins where that is, temperatures and link
+        voltage at their parameters, and the rest at zero. Modes follow from them.
     parameters : mapping of str to float
         Values by name that differ from the defaults; the model is not built again.
     resolution : float or None
@@ -65,7 +67,7 @@ def simulate(  # noqa: PLR0913 - a simulation has this many choices, all but two
     KeyError
         Unknown input, state or parameter (the nearest names are given).
     ValueError
-        Duration or resolution not positive.
+        Duration or resolution not positive, or a reference beyond the end stops of the gear.
     SimulationError
         Chattering, inconsistent modes, or a step that cannot be completed, with time and modes.
     """
@@ -75,8 +77,12 @@ def simulate(  # noqa: PLR0913 - a simulation has this many choices, all but two
         if not (value > 0 and math.isfinite(value)):
             raise ValueError(f"simulate: {name} must be > 0 s, got {value!r}")
     signals = _signals(system, inputs or {})
+    if isinstance(plant, Actuator) and plant.gear.stops and "reference" in (inputs or {}):
+        reference = signals[[quantity.name for quantity in system.inputs].index("reference")]
+        require_within_stops(with_values(plant.gear, "gear", parameters or {}), *bounds(reference, duration))
     waves = {(wave.frequency, wave.rate) for signal in signals for _, piece in signal.pieces() for wave in piece.waves}
-    x, p = system.state_vector(start), system.parameter_values(parameters)
+    p = system.parameter_values(parameters)
+    x = system.state_vector(start, p)
     period = system.tick_period(p)
     fine, stride = (
         (1, 1) if math.isinf(period) else (math.ceil(period / resolution * ALMOST), int(resolution / period / ALMOST))

@@ -33,7 +33,7 @@ class PlantVoltages:
         self.motor, self.inverter, self.link = parts["motor"], parts["inverter"], parts["link"]
         self.voltage: Scalar | None = None
         if self.link is not None:
-            self.voltage = book.state("link.voltage", "V", initial=parts["link_start"])
+            self.voltage = book.state("link.voltage", "V", initial=self.link.source_voltage)
         self.demand: CurrentReference | None = None
         if isinstance(self.motor, PMSM) and parts["controller"].current_demand == "least current":
             names = ("pole_pairs", "flux", "inductance_d", "inductance_q")
@@ -63,14 +63,15 @@ class PlantVoltages:
 
 def winding(site: "Site", voltages: PlantVoltages, torque: Scalar, speed: Scalar, angle: Scalar) -> Scalar:
     """Torque on the rotor [N m] from the torque reference, the measured speed and the measured angle of the motor."""
-    motor, loop = site.parts["motor"], site.loops["current"]
+    motor = site.parts["motor"]
     if isinstance(motor, TorqueSource):
         return site.loops["speed"].delayed("controller.torque", "N m", torque)
     if isinstance(motor, CurrentSource):
         return _current_source(site, motor, torque)
+    loop = site.loops["current"]
     currents = [site.book.state(f"motor.{axis}", "A") for axis in motor.axes]
     measured = [site.sensed("current", current, path=axis) for axis, current in zip(motor.axes, currents, strict=True)]
-    references = voltages.currents(torque, speed, site.housing)
+    references = voltages.currents(torque, speed, site.winding)
     electrical = [motor.pole_pairs * value for value in (angle, site.motion.motor_angle)] if _turns(motor) else [0, 0]
     wanted, realize = _current_control(site, voltages, loop, references, measured, speed)
     realized = realize(wanted, electrical[0])
@@ -98,6 +99,10 @@ def _current_source(site: "Site", motor: CurrentSource, torque: Scalar) -> Scala
     for axis, rate in zip(motor.axes, motor.derivatives(currents, demanded), strict=True):
         site.book.rate(f"motor.{axis}", rate)
     site.book.output("current", "A", currents[0] if currents else demanded)
+    speed = site.motion.motor_speed
+    site.losses.update(iron=motor.rotor.iron_loss(speed), drag=motor.rotor.friction_loss(speed))
+    for name, value in site.losses.items():
+        site.book.output(f"{name}_loss", "W", value)
     return motor.shaft_torque(currents or [demanded], site.motion.motor_angle, site.motion.motor_speed)
 
 
@@ -114,10 +119,11 @@ def _current_control(
         integrals, errors, references, motor.coupling_voltages(measured, speed), strict=True
     ):
         proposal = law.proposed(integral[0], error, reference)
-        wanted.append(limited(proposal + emf if cascade.decoupling else proposal, law.limit))
+        wanted.append(proposal + emf if cascade.decoupling else proposal)
 
     def realize(demanded: list[Scalar], angle: Scalar) -> list[Scalar]:
-        realized = voltages.inverter.realize(demanded, angle, voltages.voltage)
+        within = [limited(voltage, law.limit) for voltage in demanded]
+        realized = voltages.inverter.realize(within, angle, voltages.voltage)
         for integral, error, want, got in zip(integrals, errors, demanded, realized, strict=True):
             loop.integrate(law, integral, error, want, got)
         return realized
@@ -148,7 +154,7 @@ def _powers(site: "Site", voltages: PlantVoltages, currents: list, terminals: li
     into_motor = motor.electrical_power(currents, terminals)
     site.losses.update(copper=losses.copper, iron=losses.iron, drag=losses.friction, inverter=conduction)
     book.output("electrical_power", "W", into_motor + conduction)
-    book.output("magnetic_energy", "J", motor.magnetic_energy(currents))
+    book.output("magnetic_energy", "J", motor.magnetic_energy(currents) + motor.rotor.energy(site.motion.motor_angle))
     for name, value in site.losses.items():
         book.output(f"{name}_loss", "W", value)
     if voltages.link is not None:

@@ -147,10 +147,11 @@ def ticks_function(  # noqa: PLR0913 - how finely and how often
 
     (x, m, p, due, period, coefficients) -> states, modes, outputs, margins, log, faults, ends, end modes
 
-    `due` has a column per tick. The first four results have a column per output point, a tick's being the state after
-    it. The log has `fine` + 1 columns per tick; its times are parts of the period. A fault of a tick is 1 where no
-    consistent modes were found after it, or a margin was negative before it. The ends are states and modes one period
-    after each tick, before the next.
+    `due` has a column per tick, negative for one that is passed over. The first four results have a column per output
+    point, a tick's being the state after it. The log has `fine` + 1 columns per tick; its times are parts of the
+    period. A fault of a tick is 1 where no consistent modes were found after it, or a margin was negative before it,
+    and for all ticks behind one with more events than the log holds or a fault: they are passed over, as they are run
+    again. The ends are states and modes one period after each tick, before the next.
     """
     assert system.tick is not None
     # from tick to tick little happens, mostly: the whole way is tried first
@@ -158,23 +159,31 @@ def ticks_function(  # noqa: PLR0913 - how finely and how often
     moving, nm = system.moving, len(system.modes)
     x, m, p, period, wave = _window_inputs(system, form)
     derived, due = ca.MX.sym("derived", pieces.derived.size1_out(0)), ca.MX.sym("due", len(system.clocks))
-    start = ca.MX.sym("start")
+    start, broken = ca.MX.sym("start"), ca.MX.sym("broken")
     u = _input_function(form)(start, wave)
     x1, m1, fault = _settle_where_needed(system)(x, system.tick(due, x, m, u, p), m, u, p)
-    path = pieces.between(x1, m1, p, derived, period, start, wave)
-    states, codes, *_ = ca.vertsplit(path[:, -1], _log_rows(moving, code.size))
+    fault = ca.fmax(ca.fmax(fault, broken), due[0] < 0)
+    path = pieces.between(x1, m1, p, derived, period * (1 - fault), start, wave)
+    states, codes, events, *_ = ca.vertsplit(path[:, -1], _log_rows(moving, code.size))
     nominal = ca.DM([state.nominal for state in system.states[:moving]])
     one = ca.Function(
         "one_tick",
-        [x, m, p, derived, due, period, start, wave],
-        [ca.vertcat(states * nominal, x1[moving:, :]), _unpack_function(code, nm)(codes), path, x1[moving:, :], fault],
+        [x, m, broken, p, derived, due, period, start, wave],
+        [
+            ca.vertcat(states * nominal, x1[moving:, :]),
+            _unpack_function(code, nm)(codes),
+            ca.fmax(fault, events > LOG_SLOTS + 0.5),  # noqa: PLR2004 - counts are whole numbers
+            path,
+            x1[moving:, :],
+            fault,
+        ],
     )
-    many = one.mapaccum("many", count, [0, 1], [0, 1])
+    many = one.mapaccum("many", count, [0, 1, 2], [0, 1, 2])
     schedule = ca.MX.sym("due", len(system.clocks), count)
     same = [ca.repmat(value, 1, count) for value in (p, pieces.derived(p))]
     starts = period * ca.DM(range(count)).T
-    ends, end_modes, path, held, faults = many(
-        x, m, *same, schedule, ca.repmat(period, 1, count), starts, ca.repmat(wave, 1, count)
+    ends, end_modes, _, path, held, faults = many(
+        x, m, 0, *same, schedule, ca.repmat(period, 1, count), starts, ca.repmat(wave, 1, count)
     )
     seen_at = [(tick, k) for tick in range(0, count, stride) for k in range(fine)]
     times = period * ca.DM([tick + k / fine for tick, k in seen_at]).T
@@ -226,7 +235,7 @@ def _settle_where_needed(system: HybridSystem) -> ca.Function:
     if not any(column >= system.moving for column in touched):
         return ca.Function("settle", [before, *arguments], [after, m, 0])
     as_is = ca.Function("as_is", arguments, [after, m, 0])
-    settled = ca.Function("settled", arguments, system.reset(ca.DM.zeros(len(system.margin_names)), *arguments))
+    settled = ca.Function("settled", arguments, list(system.reset(ca.DM.zeros(len(system.margin_names)), *arguments)))
     needed = ca.mmin(system.margins(*arguments)) < 0
     missed = ca.mmin(system.margins(before, m, u, p)) < -VIOLATION
     state, modes, fault = ca.Function.if_else("choice", settled, as_is)(needed, *arguments)

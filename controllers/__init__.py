@@ -1,6 +1,7 @@
 """Control laws and their design rules: pure, no plant inside."""
 
 from controllers.cascade import Cascade as Cascade
+from controllers.cascade import Remedies as Remedies
 from controllers.compensation import Dither as Dither
 from controllers.compensation import FrictionCompensation as FrictionCompensation
 from controllers.compensation import Knocker as Knocker

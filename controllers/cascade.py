@@ -46,8 +46,8 @@ class Cascade:
 
     Parameters
     ----------
-    position : P or PI
-        Gain [1/s] on the position error at the load.
+    position : P, PI or None
+        Gain [1/s] on the position error at the load; None for a speed drive, whose reference is the motor's speed.
     speed : PI
         Torque at the motor [N m] from the speed error of the motor [rad/s].
     current : PI or None
@@ -84,7 +84,7 @@ class Cascade:
         Where parts do not go together.
     """
 
-    position: P | PI
+    position: P | PI | None
     speed: PI
     current: PI | None
     speed_limit: Speed
@@ -103,6 +103,8 @@ class Cascade:
         check(self)
         check_choice(self, "feedback", ("load", "motor"))
         check_choice(self, "current_demand", ("quadrature", "least current"))
+        if self.position is None:
+            self._require_no_position()
         if self.feed_forward is not None and self.reference is None:
             raise ValueError(
                 "Cascade.feed_forward needs the speed of the reference: limit it, with reference = RateLimit or "
@@ -110,6 +112,16 @@ class Cascade:
             )
         if self.schedule is not None and self.schedule.over not in ("temperature", "load"):
             raise ValueError(f'Cascade.schedule is over "temperature" or "load", got {self.schedule.over!r}')
+
+    def _require_no_position(self) -> None:
+        """Raise where a part needs the position loop that a speed drive lacks."""
+        needing = {"reference": self.reference, "feed_forward": self.feed_forward, "knocker": self.remedies.knocker}
+        for name, part in needing.items():
+            if part is not None:
+                raise ValueError(
+                    f"Cascade without a position loop (position = None) has no position error: leave {name} out, "
+                    "or give it a position law"
+                )
 
     @classmethod
     def for_bandwidths(  # noqa: PLR0913 - a design has this many numbers

@@ -11,13 +11,13 @@ from cattrs.cols import is_mapping, mapping_structure_factory
 from cattrs.gen import make_dict_structure_fn
 
 from actuator.parameters import require_known
-from actuator.signals import Chirp, Constant, Gust, Ramp, Signal, Sine, Step, Sum, Table
+from actuator.signals import Chirp, Constant, Gust, Ramp, Signal, Sine, Staircase, Step, Sum, Table
 from studies.units import field_unit, is_number, spellings, split, to_si
 
 Hook = Callable[[Any, Any], Any]
 
 TAG = "type"
-SIGNALS: Any = Constant | Step | Ramp | Sine | Chirp | Gust | Table | Sum
+SIGNALS: Any = Constant | Step | Ramp | Sine | Chirp | Gust | Table | Staircase | Sum
 NUMBER, WHOLE, TEXT, SWITCH, LIST, TABLE = (
     "a number",
     "a whole number",

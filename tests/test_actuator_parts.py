@@ -13,7 +13,20 @@ from actuator.inverter import Inverter
 from actuator.load import Load
 from actuator.motor import PMSM, DCMotor, TorqueSource
 from actuator.parameters import parameterize, require_known
-from actuator.signals import Chirp, Constant, Piece, Ramp, Sine, Step, Sum, Table, Wave, break_points, piece_at
+from actuator.signals import (
+    Chirp,
+    Constant,
+    Piece,
+    Ramp,
+    Sine,
+    Staircase,
+    Step,
+    Sum,
+    Table,
+    Wave,
+    break_points,
+    piece_at,
+)
 from gear import Backlash, Bearing, Coulomb, Linear, Mesh, Shaft, Transmission
 
 ROUND = PMSM(pole_pairs=4, resistance=0.5, inductance_d=2e-3, inductance_q=2e-3, flux=0.05, inertia=1e-4)
@@ -168,6 +181,7 @@ SIGNALS = (
     (CHIRP, chirp),
     (TABLE, lambda t: np.interp(t, TIMES, VALUES)),
     (Table(times=(1.0,), values=(3.0,)), lambda t: 3.0),
+    (Staircase(times=TIMES, values=VALUES), lambda t: VALUES[max(sum(time <= t for time in TIMES), 1) - 1]),
     (Sum(parts=(TABLE, STEP, CHIRP)), lambda t: np.interp(t, TIMES, VALUES) + (2 if t >= 0.3 else -1) + chirp(t)),
     (Sum(parts=(Sum(parts=(TABLE, TABLE)), Constant(value=1.0))), lambda t: 2 * np.interp(t, TIMES, VALUES) + 1),
     (Sum(parts=()), lambda t: 0.0),
@@ -309,6 +323,8 @@ def test_a_component_of_symbols_at_its_defaults_is_the_component_of_numbers(comp
         (lambda: Inverter(dc_voltage=-48.0, current_limit=1.0), "Inverter.dc_voltage must be > 0 V, got -48 V"),
         (lambda: Load(inertia=-1.0), r"Load.inertia must be >= 0 kg m\^2, got -1 kg m\^2"),
         (lambda: Table(times=(0.0, 1.0), values=(1.0,)), "Table needs as many values as times, got 1 and 2"),
+        (lambda: Staircase(times=(0.0,), values=()), "Staircase needs as many values as times, got 0 and 1"),
+        (lambda: Staircase(times=(1.0, 0.0), values=(1.0, 2.0)), "Staircase.times must increase from point to point"),
         (lambda: Table(times=(), values=()), "Table needs as many values as times, got 0 and 0"),
         (lambda: Table(times=(0.0, 1.0, 1.0), values=(1.0, 2.0, 3.0)), "Table.times must increase from point to point"),
     ],

@@ -1,6 +1,6 @@
 """Sampled controllers as clocks of the hybrid system.
 
-Oracles: the recursion of plant (zero-order hold, from `control.c2d`) and control law, written out here tick by tick; the
+Oracles: the recursion of plant (zero-order hold, from `control.c2d`) and control law, written out tick by tick; the
 continuous actuator in the limit of fast sampling; a counter that is a law itself; the same run with finer output,
 other output points and interpreted.
 """
@@ -178,3 +178,18 @@ def test_a_period_can_be_swept_and_its_ratio_not():
     fast = replace(load_case("aileron").actuator, sampling=Sampling(current=1e-4, speed=5e-4, position=1e-3))
     with pytest.raises(ValueError, match="change all periods by the same factor"):
         simulate(fast, 0.1, parameters={"sampling.current": 5e-4})
+
+
+def test_the_hunting_sampled_aileron_loses_no_mode_change_against_a_tolerance_ten_times_tighter():
+    """10 kHz, two stages with gaps, encoders, dead time and drops: through the step and the first swings."""
+    case = load_case("aileron-sampled")
+    runs = [
+        simulate(case.actuator, 0.5, inputs=case.inputs, resolution=2e-3, tolerance=tolerance, compiled=False)
+        for tolerance in (1e-6, 1e-7)
+    ]
+    assert len(runs[0].changes) > 50
+    assert [change[1:] for change in runs[0].changes] == [change[1:] for change in runs[1].changes]
+    np.testing.assert_allclose(
+        [change.time for change in runs[0].changes], [change.time for change in runs[1].changes], atol=2e-4
+    )
+    assert all(run.margins.min() >= -1e-9 for run in runs)

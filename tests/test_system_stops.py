@@ -135,7 +135,7 @@ def test_free_play_with_friction_and_stops_is_driven_to_and_fro_without_a_margin
     assert run.statistics.events > 50
 
 
-def test_a_controller_stays_between_the_stops_and_a_reference_beyond_them_pushes_with_its_whole_torque():
+def test_a_controller_stays_between_the_stops_and_misled_beyond_them_pushes_with_its_whole_torque():
     gear = Transmission(
         shafts={"surface": Shaft(inertia=0.05)},
         bearings={"hinge": Bearing(shaft="surface", coulomb=0.1, breakaway=0.1, viscous=1.0)},
@@ -146,7 +146,9 @@ def test_a_controller_stays_between_the_stops_and_a_reference_beyond_them_pushes
     pid = PID(proportional=50.0, integral=20.0, derivative=3.0, limit=40.0)
     servo = driven(gear, controller=pid)
     assert flanks(simulate(servo, 3.0, inputs={"reference": Step(time=0.1, after=0.3)}), "stops.surface").any() == 0
-    against = simulate(servo, 5.0, inputs={"reference": Step(time=0.1, after=2.0)})
+    with pytest.raises(ValueError, match=r"reference goes from 0 rad to 2 rad, .* touches at -0.5 rad and 0.5 rad"):
+        simulate(servo, 5.0, inputs={"reference": Step(time=0.1, after=2.0)})
+    against = simulate(servo, 5.0, inputs={"inject.position": Step(time=0.1, after=-2.0)})
     # the motor's 40 N m are on the spring of the stop, but for what the bearing may hold
     assert against["load_angle"][-1] - 0.5 == pytest.approx(40.0 / 1e4, abs=0.11 / 1e4)
 

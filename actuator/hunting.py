@@ -1,26 +1,29 @@
-"""Does it hunt? A verdict from a run, with the cycle's period, amplitude and stick fraction."""
+"""Does it hunt? A verdict from a run or a measured log, with the cycle's period, amplitude, stick fraction and wear."""
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from actuator.run import FREE, STUCK, Run
+from actuator.hunting_signals import DECAYED, Pattern, limit_of, moments, pattern, period_of, trend, turning_points
+from actuator.hunting_trace import GROWTH, STILL, Trace, pieces, trace_of
+from actuator.hunting_wear import Wear, wear
+from actuator.run import Run
 
 REST, HUNTING, LIMIT_CYCLE = "rest", "hunting", "limit cycle without sticking"
-DIVERGING, IRREGULAR = "diverging", "irregular"
+QUANTIZER, DIVERGING, IRREGULAR = "quantizer hunting", "diverging", "irregular"
+VERDICTS = (REST, HUNTING, LIMIT_CYCLE, QUANTIZER, DIVERGING, IRREGULAR)
 
-STILL = 1e-9  # rad; less motion than this is none
-SAME = 0.02  # relative difference up to which two swings or two periods are the same
 SWING = 0.1  # part of the largest late swing that counts as a turn
+PARTS = (0.5, 0.25, 0.125)  # of the time that are "late": what a long transient hides, the last of them shows
+PRESENT = 1.25  # periods within which the last turn must lie, or the cycle has ended
 GROWS = 1.25  # from each eighth of the time to the next; the start of a step response grows by less
 SETTLED = 1e-3  # part of all motion that is left in the last eighth of a settling load
-DECAYED = 0.3  # part of the last swing that may be left for ever on the way to rest
-FLAT = 0.01  # part of the least swing within which a plateau is level
-GROWTH = 2.0  # factor over the observed time that is growth, and its inverse decay
 STICKS = 1e-3  # part of a period at standstill from which a cycle is called hunting
+QUANTA = 3.0  # counts of the sensor, peak to peak, up to which a sampled drive hunts for its quantizer
+LASTS = 1e3  # times the observed time that a standstill must last to be called rest in spite of a drift
 SHORTEST = 20  # output points
-FEWEST = 6  # swings from which a trend can be seen
-LONGEST_PATTERN = 6  # swings after which a cycle must repeat
+FEWEST = 6  # swings from which a trend can be seen, and a cycle
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,7 +34,8 @@ class Hunting:
     ----------
     verdict : str
         "rest", "hunting" (a cycle with all contacts stuck for part of it), "limit cycle without sticking",
-        "diverging" or "irregular".
+        "quantizer hunting" (a cycle of a sampled drive no larger than a few counts of its sensor), "diverging" or
+        "irregular".
     reason : str
         In a sentence, with the numbers it rests on.
     period_s, amplitude_rad, stick_fraction : float
@@ -39,6 +43,14 @@ class Hunting:
         is stuck; nan without a cycle.
     motor_amplitude_rad : float
         Half of peak to peak at the motor; nan without a cycle.
+    standing_error_rad : float
+        Reference less load, at the end of a run that rests and in the mean of a cycle; nan without a reference.
+    longer_s : float
+        How much longer to look [s] where the run does not decide; nan where it does.
+    release_s : float
+        When a contact that a drifting controller loads lets go, after the end [s]; nan where none is known to.
+    wear : Wear
+        Reversals, travel, current and heat, over the period of a cycle or else the second half.
     """
 
     verdict: str
@@ -47,11 +59,20 @@ class Hunting:
     amplitude_rad: float = float("nan")
     stick_fraction: float = float("nan")
     motor_amplitude_rad: float = float("nan")
+    standing_error_rad: float = float("nan")
+    longer_s: float = float("nan")
+    release_s: float = float("nan")
+    wear: Wear = field(default_factory=Wear)
 
     @property
     def cycles(self) -> bool:
         """Whether it keeps moving periodically."""
-        return self.verdict in (HUNTING, LIMIT_CYCLE)
+        return self.verdict in (HUNTING, LIMIT_CYCLE, QUANTIZER)
+
+    @property
+    def decided(self) -> bool:
+        """Whether the run is long and regular enough for a verdict."""
+        return self.verdict != IRREGULAR
 
 
 def classify(run: Run, *, since: float | None = None) -> Hunting:
@@ -71,180 +92,153 @@ def classify(run: Run, *, since: float | None = None) -> Hunting:
     Returns
     -------
     Hunting
-        With `verdict` "irregular" where the run does not decide, and why.
+        With `verdict` "irregular" where the run does not decide, why, and how much longer it should be.
     """
-    start = _inputs_settled(run) if since is None else since
-    keep = run.t >= start
-    time, load = run.t[keep], run["load_angle"][keep]
+    return judge(trace_of(run, since))
+
+
+def judge(trace: Trace, *, again: str = "simulate longer") -> Hunting:
+    """The verdict on a trace; `again` is what to do where it does not decide."""
+    time, load = trace.time, trace.load
     if len(time) < SHORTEST:
-        return Hunting(
-            verdict=IRREGULAR,
-            reason=f"only {len(time)} output points after the last change of an input; simulate longer",
-        )
-    late = load[time >= (time[0] + time[-1]) / 2]
-    if np.ptp(late) <= STILL:
-        drifts = _drift(run, keep)
-        if drifts:
-            return Hunting(verdict=IRREGULAR, reason=f"the load stands still but {drifts}; simulate longer")
-        return Hunting(verdict=REST, reason=f"the load moves less than {STILL:g} rad in the second half")
-    turns = turning_points(load, SWING * np.ptp(late))
-    swings, moments = np.abs(np.diff(load[turns])), time[turns]
-    pattern = _pattern(swings, np.diff(moments), float(np.diff(time).max()))
-    if pattern is None:
-        away = _moves_away(run, keep)
-        return _without_cycle(swings, load, time[-1] - time[0], _drift(run, keep), away)
-    period, window = _period(run, time, load, moments[-1 - pattern], moments[-1])
-    stuck = stuck_fraction(run, window[1] - period, window[1])
-    cycle = (run.t >= window[1] - period) & (run.t <= window[1])
+        why = f"only {len(time)} output points after the last change of an input; {again}"
+        return Hunting(verdict=IRREGULAR, reason=why)
+    half = (time[0] + time[-1]) / 2
+    if np.ptp(load[time >= half]) <= trace.still:
+        return _standing(trace, half, again)
+    turns, times, found = _cycle(trace)
+    if found is None:
+        return _without_cycle(trace, turns, again)
+    factor = trend(found.sizes)
+    if factor != 1.0:
+        return _of_trend(trace, factor, len(found.sizes))
+    end = float(times[-1])
+    return _of_cycle(trace, found, end - period_of(time, load, float(times[-1 - found.swings]), end), end)
+
+
+def _cycle(trace: Trace) -> tuple[list[int], np.ndarray, Pattern | None]:
+    """Turning points, when its swings happen, and the pattern in which they repeat up to the end."""
+    time, load, first = trace.time, trace.load, None
+    step = float(np.diff(time).max())
+    for part in PARTS:
+        late = load[time >= time[-1] - part * (time[-1] - time[0])]
+        turns = turning_points(load, max(SWING * float(np.ptp(late)), trace.still))
+        first = turns if first is None else first
+        times = moments(time, load, turns)
+        found = pattern(np.abs(np.diff(load[turns])), np.diff(times), step, trace.same)
+        if found and time[-1] - times[-1] < PRESENT * (times[-1] - times[-1 - found.swings]) + step:
+            return turns, times, found
+    return first or [], np.zeros(0), None
+
+
+def _of_cycle(trace: Trace, found: Pattern, start: float, end: float) -> Hunting:
+    cycle = (trace.time >= start) & (trace.time <= end)
+    swing, stuck = float(np.ptp(trace.load[cycle])), trace.standing(start, end)
+    verdict = HUNTING if stuck > STICKS else LIMIT_CYCLE
+    reason = f"swings of the load repeat after {found.swings} turns, stuck for {stuck:.1%} of the period"
+    if 0 < swing <= QUANTA * trace.resolution:
+        verdict = QUANTIZER
+        reason += f"; they are {swing / trace.resolution:.2g} counts of the sensor, of {trace.resolution:.3g} rad"
     return Hunting(
-        verdict=HUNTING if stuck > STICKS else LIMIT_CYCLE,
-        reason=f"swings of the load repeat after {pattern} turns, stuck for {stuck:.1%} of the period",
-        period_s=period,
-        amplitude_rad=float(np.ptp(run["load_angle"][cycle]) / 2),
+        verdict=verdict,
+        reason=f"{reason}; {trace.note}" if trace.note else reason,
+        period_s=end - start,
+        amplitude_rad=swing / 2,
         stick_fraction=stuck,
-        motor_amplitude_rad=float(np.ptp(run["motor_angle"][cycle]) / 2),
+        motor_amplitude_rad=math.nan if trace.motor is None else float(np.ptp(trace.motor[cycle]) / 2),
+        standing_error_rad=_error(trace, start, end),
+        wear=wear(trace, start, end),
     )
 
 
-def turning_points(signal: np.ndarray, least: float) -> list[int]:
-    """Indices at which the signal turns, each swing at least `least`; a plateau counts at its first point."""
-    found, low, high, rising = [], 0, 0, None
-    flat = FLAT * least
-    for k in range(1, len(signal)):
-        if signal[k] > signal[high] + flat:
-            high = k
-        if signal[k] < signal[low] - flat:
-            low = k
-        if rising is not False and signal[k] < signal[high] - least:
-            found.append(high)
-            low, rising = k, False
-        elif rising is not True and signal[k] > signal[low] + least:
-            found.append(low)
-            high, rising = k, True
-        if rising is True:
-            low = k
-        elif rising is False:
-            high = k
-    return found
+def _error(trace: Trace, start: float, end: float) -> float:
+    """Mean of reference less load; a single instant where both times are the same."""
+    if trace.reference is None:
+        return math.nan
+    window = (trace.time >= start) & (trace.time <= end)
+    time, error = trace.time[window], (trace.reference - trace.load)[window]
+    return float(np.trapezoid(error, time) / (time[-1] - time[0])) if len(time) > 1 else float(error[-1])
 
 
-def stuck_fraction(run: Run, start: float, end: float) -> float:
-    """Part of the time from start to end in which every contact is stuck, from the times of the mode changes."""
-    modes = {name: str(row[0]) for name, row in run.modes.items()}
-    modes |= {change.contact: change.before for change in reversed(run.changes)}
-    # a contact that never sticks (no friction, or in its gap) does not tell whether the others stand
-    modes = {name: mode for name, mode in modes.items() if (run.modes[name] == STUCK).any()}
-    if not modes:
-        return 0.0
-    stuck, at = 0.0, float(start)
-    for change in run.changes:
-        if change.time > end:
-            break
-        if change.time > at:
-            stuck += (change.time - at) * all(mode in (STUCK, FREE) for mode in modes.values())
-            at = change.time
-        if change.contact in modes:
-            modes[change.contact] = change.after
-    stuck += (end - at) * all(mode in (STUCK, FREE) for mode in modes.values())
-    return float(stuck / (end - start))
+def _standing(trace: Trace, half: float, again: str) -> Hunting:
+    """A load that does not move."""
+    time = trace.time
+    why = f"the load moves less than {trace.still:g} rad in the second half"
+    if trace.drift and trace.release > LASTS * (time[-1] - time[0]):
+        why += f"; {trace.drift}, at which rate a contact lets go after {trace.release:.2g} s"
+    elif trace.drift:
+        why = f"the load stands still but {trace.drift}"
+        return _undecided(trace, why, again, (time[-1] - half) + _known(trace.release))
+    return _at_rest(trace, why)
 
 
-def _inputs_settled(run: Run) -> float:
-    """Time of the last change of an input."""
-    last = 0.0
-    for quantity in run.system.inputs:
-        values = run[quantity.name]
-        changes = np.flatnonzero(values != values[-1])
-        if changes.size:
-            last = max(last, float(run.t[min(changes[-1] + 1, len(values) - 1)]))
-    return last
+def _at_rest(trace: Trace, reason: str, *, settled: bool = True) -> Hunting:
+    """At rest, or on the way there; with the error that is left, and what holding costs."""
+    time = trace.time
+    error = _error(trace, float(time[-1]), float(time[-1])) if settled else math.nan
+    if abs(error) > trace.still:
+        reason += f", {error:.3g} rad from its reference"
+    return Hunting(
+        verdict=REST,
+        reason=f"{reason}; {trace.note}" if trace.note else reason,
+        standing_error_rad=error,
+        release_s=trace.release,
+        wear=wear(trace, float((time[0] + time[-1]) / 2), float(time[-1])),
+    )
 
 
-def _pattern(swings: np.ndarray, times: np.ndarray, step: float) -> int | None:
-    """Smallest even number of swings after which sizes and times repeat, twice over; None where they do not.
-
-    Times are known to `step`, the distance of the output points.
-    """
-    for count in range(2, LONGEST_PATTERN + 1, 2):
-        if len(swings) < 2 * count + 1:
-            return None
-        pairs = [(row[-count:], row[-2 * count : -count]) for row in (swings, times)]
-        whole = times[-count:].sum()
-        sizes_repeat = np.allclose(*pairs[0], rtol=SAME, atol=SAME * swings[-count:].max())
-        times_repeat = np.allclose(*pairs[1], rtol=SAME, atol=SAME * whole + 2 * step)
-        if sizes_repeat and times_repeat:
-            return count
-    return None
+def _known(value: float) -> float:
+    return value if math.isfinite(value) else 0.0
 
 
-def _period(
-    run: Run, time: np.ndarray, load: np.ndarray, start: float, end: float
-) -> tuple[float, tuple[float, float]]:
-    """Period and the window it was measured in, from upward passages of mid-swing before `end`."""
-    rough = end - start
-    window = (time >= end - 1.05 * rough) & (time <= end)
-    middle = (load[window].max() + load[window].min()) / 2
-    above = load > middle
-    rises = np.flatnonzero(above[1:] & ~above[:-1])
-    passages = time[rises] + (middle - load[rises]) / (load[rises + 1] - load[rises]) * (time[rises + 1] - time[rises])
-    back = [last - passage for last in passages[-1:] for passage in passages[:-1]]
-    near = min(back, key=lambda length: abs(length - rough), default=rough)
-    return float(near), (float(end - near), float(end))
+def _undecided(trace: Trace, why: str, again: str, swing: float) -> Hunting:
+    """Irregular; `swing` is how long one more swing may take [s]."""
+    observed = float(trace.time[-1] - trace.time[0])
+    longer = max(observed, FEWEST * swing)
+    reason = f"{why}; {again}, by about {longer:.2g} s"
+    if math.isfinite(trace.release):
+        reason += f" (at the present rate a contact lets go after {trace.release:.3g} s)"
+    return Hunting(verdict=IRREGULAR, reason=reason, longer_s=longer, release_s=trace.release)
 
 
-def _drift(run: Run, keep: np.ndarray) -> str:
-    """The controller state that still moves behind a standing load, in words; empty where none does."""
-    for quantity in run.system.states:
-        if quantity.name.startswith("controller."):
-            before, after = _pieces(run[quantity.name][keep], 4)[2:]
-            if after > max(STILL * quantity.nominal, before / GROWTH):
-                return f"{quantity.name} still moves, by {after:.3g} {quantity.unit} in the last quarter"
-    return ""
+def _of_trend(trace: Trace, factor: float, periods: int) -> Hunting:
+    if factor > 1:
+        why = f"the motion of the load grows, by a factor {factor:.3g} in each of {periods} periods"
+        return Hunting(verdict=DIVERGING, reason=why)
+    why = f"the swings of the load shrink, by a factor {factor:.3g} in each of {periods} periods"
+    return _at_rest(trace, why, settled=False)
 
 
-def _moves_away(run: Run, keep: np.ndarray) -> bool:
+def _moves_away(trace: Trace) -> bool:
     """Whether the load is farther from its reference in the last quarter than in the first; true without one."""
-    if "reference" not in run.signals:
+    if trace.reference is None:
         return True
-    error = np.abs(run["reference"] - run["load_angle"])[keep]
+    error = np.abs(trace.reference - trace.load)
     quarter = max(len(error) // 4, 1)
     return bool(error[-quarter:].max() > error[:quarter].max())
 
 
-def _pieces(signal: np.ndarray, count: int) -> list[float]:
-    """Peak to peak in each of `count` equal pieces."""
-    return [float(np.ptp(piece)) for piece in np.array_split(signal, count)]
-
-
-def _without_cycle(swings: np.ndarray, load: np.ndarray, observed: float, drifts: str, away: bool) -> Hunting:
-    *_, e5, e6, e7, e8 = _pieces(load, 8)
-    if min(e6 / max(e5, STILL), e7 / max(e6, STILL), e8 / max(e7, STILL)) > GROWS and e5 > STILL and away:
+def _without_cycle(trace: Trace, turns: list[int], again: str) -> Hunting:
+    load, still = trace.load, max(STILL, trace.still)
+    observed = float(trace.time[-1] - trace.time[0])
+    swings, turned = np.abs(np.diff(load[turns])), trace.time[turns]
+    *_, e5, e6, e7, e8 = pieces(load, 8)
+    if min(e6 / max(e5, still), e7 / max(e6, still), e8 / max(e7, still)) > GROWS and e5 > still and _moves_away(trace):
         factor = e8 / e5
         return Hunting(
             verdict=DIVERGING, reason=f"the motion of the load grows, by a factor {factor:.3g} in {observed / 2:.3g} s"
         )
-    if e8 < SETTLED * np.ptp(load) and e8 < e7 / GROWTH and not drifts:
-        return Hunting(verdict=REST, reason=f"the load settles, to within {e8:.3g} rad in the last eighth")
+    if e8 < max(SETTLED * np.ptp(load), trace.still) and e8 <= max(e7 / GROWTH, trace.still) and not trace.drift:
+        return _at_rest(trace, f"the load settles, to within {e8:.3g} rad in the last eighth")
     if len(swings) < FEWEST:
-        why = f"but {drifts}" if drifts else "and does not settle"
-        return Hunting(
-            verdict=IRREGULAR,
-            reason=f"the load turns only {len(swings) + 1} times in {observed:g} s {why}; simulate longer",
-        )
+        why = f"but {trace.drift}" if trace.drift else "and does not settle"
+        waits = [*np.diff(turned), trace.time[-1] - (turned[-1] if turns else trace.time[0]) + _known(trace.release)]
+        why = f"the load turns only {len(swings) + 1} times in {observed:g} s {why}"
+        return _undecided(trace, why, again, float(max(waits)))
     ratios = swings[1:] / swings[:-1]
-    if (ratios[1 - FEWEST :] < 1 - 2 * SAME).all() and _limit(swings) < DECAYED * swings[-1]:
+    if (ratios[1 - FEWEST :] < 1 - 2 * trace.same).all() and limit_of(swings[-5::2]) < DECAYED * swings[-1]:
         total = swings[-1] / swings[-FEWEST]
-        return Hunting(
-            verdict=REST,
-            reason=f"each swing of the load is smaller than the one before, the last {FEWEST} by {total:.3g}",
-        )
-    return Hunting(
-        verdict=IRREGULAR,
-        reason=f"{len(swings)} swings of the load in {observed:g} s neither repeat nor settle; simulate longer",
-    )
-
-
-def _limit(swings: np.ndarray) -> float:
-    """Where shrinking swings are going, by Aitken's rule on every other one; a transient into a cycle shrinks, too."""
-    early, late = swings[-3] - swings[-5], swings[-1] - swings[-3]
-    return float(abs(swings[-1] - late**2 / (late - early))) if late != early else float("inf")
+        why = f"each swing of the load is smaller than the one before, the last {FEWEST} by {total:.3g}"
+        return _at_rest(trace, why, settled=False)
+    why = f"{len(swings)} swings of the load in {observed:g} s neither repeat nor settle"
+    return _undecided(trace, why, again, float(np.diff(turned).max()))

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MultipleLocator
 
-from actuator.linear import margins
+from actuator.loop_margins import margins
 from actuator.parameters import require_known
 from actuator.run import BACKWARD, FORWARD, FREE, STUCK, Run
 
@@ -79,17 +79,18 @@ def plot_bode(loops: Mapping[str, control.StateSpace], title: str, frequencies_h
     figure = Figure(figsize=(9, 5.6), layout="constrained")
     gain, phase = figure.subplots(2, 1, sharex=True)
     for mode, loop in loops.items():
-        response = loop(2j * np.pi * f)
+        hertz = f[2 * f * loop.dt < 1] if loop.dt else f
+        response = loop(np.exp(2j * np.pi * hertz * loop.dt) if loop.dt else 2j * np.pi * hertz)
         found = margins(loop)
         color, style = LINE_COLORS.get(mode), LINE_STYLES.get(mode, "-")
         if abs(response).max() < 1e-6:  # noqa: PLR2004 - a stuck gear passes nothing on
             gain.plot([], [], color=color, label=f"{mode}: nothing passes")
             continue
         label = f"{mode}: gain margin {found.gain_db:.1f} dB, phase margin {np.degrees(found.phase_rad):.0f} deg"
-        gain.semilogx(f, 20 * np.log10(abs(response)), color=color, linestyle=style, label=label)
+        gain.semilogx(hertz, 20 * np.log10(abs(response)), color=color, linestyle=style, label=label)
         angle = np.degrees(np.unwrap(np.angle(response)))
         angle -= 360 * np.round((angle[0] + 90) / 360)  # a loop starts between +90 and -270 deg
-        phase.semilogx(f, angle, color=color, linestyle=style)
+        phase.semilogx(hertz, angle, color=color, linestyle=style)
         if np.isfinite(found.phase_rad):
             gain.axvline(found.phase_frequency / (2 * np.pi), color=color, linestyle=":", linewidth=0.8)
     gain.axhline(0, color="k", linewidth=0.8)

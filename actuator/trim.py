@@ -40,7 +40,8 @@ class OperatingPoint:
     x, m, u, p : ndarray
         State, modes, inputs, parameters.
     rates : ndarray
-        dx/dt; zero but for the states that were allowed to drift.
+        dx/dt; zero but for the states that were allowed to drift. Of what a clock holds, the change at a tick over
+        the period.
     """
 
     system: HybridSystem
@@ -157,7 +158,8 @@ def trim(  # noqa: PLR0913 - what may be held and where to start are all choices
         with contextlib.suppress(NoEquilibrium):  # without one, the search starts from zero
             before = trim(system, "forward", inputs=inputs, parameters=parameters, drifting=drifting)
             guess, flanks = before.states, before.flanks
-    u, p, x = system.input_vector(inputs), system.parameter_values(parameters), system.state_vector(guess)
+    u, p = system.input_vector(inputs), system.parameter_values(parameters)
+    x = system.state_vector(guess, p)
     scale = np.array([quantity.nominal for quantity in system.states])
     free = np.array([name not in drifting for name in names])
     flank_names = [name.removesuffix(".flank") for name in system.modes if name.endswith(".flank")]
@@ -205,11 +207,11 @@ def _newton(
     free: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Least-norm Newton steps, in states over their nominal sizes, damped until the residual falls."""
-    jacobian = _jacobian(system)
+    flow, jacobian = rates_function(system), _jacobian(system)
     drifts = ~free  # a drifting state may have any constant rate
 
     def residual(state: np.ndarray) -> np.ndarray:
-        return np.where(drifts, 0.0, system.flow(state, m, u, p).full().ravel() / scale)
+        return np.where(drifts, 0.0, flow(state, m, u, p).full().ravel() / scale)
 
     rate = residual(x)
     for _ in range(STEPS):
@@ -224,7 +226,7 @@ def _newton(
             if np.linalg.norm(rows * trial) < np.linalg.norm(rows * rate):
                 break
         x, rate = x + damping * scale * step, trial
-    rates = system.flow(x, m, u, p).full().ravel()
+    rates = flow(x, m, u, p).full().ravel()
     worst = np.argsort(-abs(rate))[:3]
     if (abs(rate) > rounding(system, x, m, u, p)).any():
         named = dict(zip([quantity.name for quantity in system.states], rates, strict=True))
@@ -247,4 +249,14 @@ def rounding(system: HybridSystem, x: np.ndarray, m: np.ndarray, u: np.ndarray, 
 @lru_cache(maxsize=32)
 def _jacobian(system: HybridSystem) -> ca.Function:
     x, m, u, p = (ca.SX.sym(name, system.flow.size1_in(i)) for i, name in enumerate(("x", "m", "u", "p")))
-    return ca.Function("jacobian", [x, m, u, p], [ca.jacobian(system.flow(x, m, u, p), x)])
+    return ca.Function("jacobian", [x, m, u, p], [ca.jacobian(rates_function(system)(x, m, u, p), x)])
+
+
+@lru_cache(maxsize=32)
+def rates_function(system: HybridSystem) -> ca.Function:
+    """(x, m, u, p) -> dx/dt; of what a clock holds, the change at a tick at which all are due, over the period."""
+    if system.tick is None or system.period is None:
+        return system.flow
+    x, m, u, p = (ca.SX.sym(name, system.flow.size1_in(i)) for i, name in enumerate(("x", "m", "u", "p")))
+    changes = (system.tick(ca.SX.ones(len(system.clocks)), x, m, u, p) - x) / system.period(p)
+    return ca.Function("rates", [x, m, u, p], [system.flow(x, m, u, p) + changes])

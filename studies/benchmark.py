@@ -1,10 +1,14 @@
 """How fast is it? Figure 9 of the gear paper and the built-in cases, compiled and interpreted."""
 
+import time as clock
 from collections.abc import Callable, Mapping
 from statistics import median
 
+import casadi as ca
+import numpy as np
+
 from actuator import Actuator, Run, simulate
-from actuator.compiled import compiler
+from actuator.compiled import compile_function, compiler
 from actuator.signals import Signal
 from studies.cases import built_in, load_case
 from studies.paper import (
@@ -16,6 +20,7 @@ from studies.paper import (
 )
 
 RESOLUTION = 2e-3  # s, of the built-in cases
+BLOCK, REPEATS = 500, 5  # evaluations that are timed together, and how often
 HEADER = f"{'case':<34}{'engine':<13}{'simulated':>10}{'wall':>11}{'events':>8}{'real time':>12}"
 
 
@@ -44,5 +49,39 @@ def benchmark(runs: int, say: Callable[[str], None]) -> None:
                 f"{title:<34}{'compiled' if compiled else 'interpreted':<13}{duration:>8g} s{1e3 * wall:>8.1f} ms"
                 f"{timed[-1].statistics.events:>8}{duration / wall:>10.0f} x"
             )
+            if compiled and plant.sampling is not None:
+                say(_shares(plant, timed[-1]))
     if not compiler():
         say("no C compiler found: nothing was compiled")
+
+
+def _shares(plant: Actuator, run: Run) -> str:
+    """Where the time of a compiled run with sampled control goes, in a line: each function timed by itself."""
+    system = plant.system()
+    assert system.tick is not None
+    x = np.array([run[state.name] for state in system.states])[:, :BLOCK]
+    same = [np.tile(value[:, None], x.shape[1]) for value in (system.input_vector(), run.parameters)]
+    modes, due = run.mode_values[:, :BLOCK], system.due(np.arange(x.shape[1]))
+    ticks = run.t[-1] / system.tick_period(run.parameters)
+    points = len(run.t)
+    spent = {
+        "laws": ticks * _seconds(system.tick, [due, x, modes, *same]),
+        "outputs": points * _seconds(system.outputs_function, [x, modes, *same]),
+        "margins at outputs": points * _seconds(system.margins, [x, modes, *same]),
+    }
+    wall = run.statistics.wall_s
+    spent["integration, events and the rest"] = wall - sum(spent.values())
+    parts = ", ".join(f"{name} {part / wall:.0%}" for name, part in spent.items())
+    return f"    {1e6 * wall / ticks:.1f} us a tick: {parts}"
+
+
+def _seconds(function: ca.Function, arguments: list[np.ndarray]) -> float:
+    """Of one evaluation of a compiled function, on columns of arguments."""
+    mapped = compile_function(function.map(arguments[0].shape[1]))
+    assert mapped is not None
+    times = []
+    for _ in range(REPEATS):
+        began = clock.perf_counter()
+        mapped(*arguments)
+        times.append(clock.perf_counter() - began)
+    return min(times) / arguments[0].shape[1]

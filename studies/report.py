@@ -6,6 +6,7 @@ import math
 import os
 import platform
 import tempfile
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib import metadata
@@ -15,8 +16,11 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
+from actuator import Orbit
 from actuator.plots import plot_bode, plot_run
-from studies.judge import Judgment
+from actuator.remedies import Remedy, cells
+from actuator.sampled_orbit import SampledOrbit
+from studies.judge import Insight, Judgment
 
 LIBRARIES = ("geared-actuator", "casadi", "control", "numpy", "scipy", "matplotlib")
 DPI = 130
@@ -42,8 +46,17 @@ def write_report(judgment: Judgment, folder: Path) -> list[Path]:
         return _moved(work, folder)
 
 
-def write_files(pictures: dict[str, Figure], result: dict[str, Any], text: list[str], folder: Path) -> list[Path]:
-    """Write pictures, result.json and findings.txt into `folder`; all of them or, on a failure, none."""
+def write_files(
+    pictures: dict[str, Figure],
+    result: dict[str, Any],
+    text: list[str],
+    folder: Path,
+    files: Mapping[str, Callable[[Path], None]] | None = None,
+) -> list[Path]:
+    """Write pictures, result.json and findings.txt into `folder`; all of them or, on a failure, none.
+
+    `files` are more of them, by name with what writes them.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder, prefix=".writing-") as hidden:
         work = Path(hidden)
@@ -51,6 +64,8 @@ def write_files(pictures: dict[str, Figure], result: dict[str, Any], text: list[
             figure.savefig(work / f"{name}.png", dpi=DPI)
         (work / "result.json").write_text(json.dumps(_finite(result), indent=2, allow_nan=False) + "\n")
         (work / "findings.txt").write_text("\n\n".join(text) + "\n", encoding="utf-8")
+        for name, write in (files or {}).items():
+            write(work / name)
         return _moved(work, folder)
 
 
@@ -75,6 +90,12 @@ def figures(judgment: Judgment) -> dict[str, Figure]:
     for name in names:
         loops = {model.mode: model.loops[name] for model in judgment.models if model.loops}
         found[f"bode_{name}"] = plot_bode(loops, f"Loop transfer, opened at {name.replace('_', ' ')}")
+    insight = judgment.insight
+    if isinstance(insight.orbit, Orbit):
+        found["orbit"] = insight.orbit.plot()
+    for name, part in (("causes", insight.causes), ("remedies", insight.remedies)):
+        if part is not None:
+            found[name] = part.plot()
     return found
 
 
@@ -96,6 +117,7 @@ def result_of(judgment: Judgment) -> dict[str, Any]:
                 for name in dict.fromkeys(loop for model in judgment.models for loop in model.margins)
             },
             "not_linearized": {model.mode: model.reason for model in judgment.models if model.reason},
+            **_insight(judgment.insight),
             "simulation": {
                 **run.statistics._asdict(),
                 "real_time_factor": run.statistics.simulated_s / run.statistics.wall_s,
@@ -105,6 +127,57 @@ def result_of(judgment: Judgment) -> dict[str, Any]:
             "versions": {"python": platform.python_version()} | {name: _version(name) for name in LIBRARIES},
         }
     )
+
+
+def _insight(insight: Insight) -> dict[str, Any]:
+    """Orbit, margins against hunting, causes and remedies as numbers."""
+    orbit, causes, remedies = insight.orbit, insight.causes, insight.remedies
+    return {
+        "orbit": None if orbit is None else _orbit(orbit),
+        "hunting_margins": {
+            kind: {"factor": margin.factor, "db": margin.db, "parameters": margin.parameters}
+            for kind, margin in insight.margins.items()
+        },
+        "causes": None
+        if causes is None
+        else {
+            "sentence": causes.sentence(),
+            "energy_per_period_J": causes.energy.elements if causes.energy else None,
+            "without": {each.cause: {"change": each.change, **asdict(each.hunting)} for each in causes.counterfactuals},
+        },
+        "remedies": None if remedies is None else [_remedy(each) for each in remedies.ranked],
+        "missing": insight.missing,
+    }
+
+
+def _orbit(orbit: Orbit | SampledOrbit) -> dict[str, Any]:
+    found = {
+        "period_s": orbit.period,
+        "amplitude_rad": orbit.load_amplitude,
+        "motor_amplitude_rad": orbit.motor_amplitude,
+        "stick_fraction": orbit.stick_fraction,
+        "residual": orbit.residual,
+        "stable": orbit.stable,
+        "multipliers": [{"real": float(mu.real), "imaginary": float(mu.imag)} for mu in orbit.multipliers],
+        "events": [event._asdict() for event in orbit.events],
+    }
+    if isinstance(orbit, Orbit):
+        found["error_of_trivial_multiplier"] = float(orbit.trivial_error)
+    return found
+
+
+def _remedy(remedy: Remedy) -> dict[str, Any]:
+    found = remedy.hunting
+    return {
+        "name": remedy.name,
+        "setting": remedy.setting,
+        "does": remedy.does,
+        "error_rad": remedy.error,
+        "predicted_error_rad": remedy.predicted_error,
+        "amplitude_rad": found.amplitude_rad,
+        "mean_loss_W": found.wear.mean_loss,
+        "stiction_factor": remedy.stiction_factor,
+    }
 
 
 def _version(library: str) -> str:
@@ -117,6 +190,8 @@ def _version(library: str) -> str:
 def _finite(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
@@ -125,12 +200,15 @@ def _finite(value: Any) -> Any:
 def _html(judgment: Judgment, result: dict[str, Any], pictures: dict[str, str]) -> str:
     environment = Environment(loader=PackageLoader("studies"), autoescape=True, undefined=StrictUndefined)
     environment.filters |= {"margin": _shown}
+    table = judgment.insight.remedies
     return environment.get_template("report.html").render(
         case=judgment.case,
         hunting=judgment.hunting,
         models=judgment.models,
         run=judgment.run,
         result=result,
+        insight=judgment.insight,
+        remedies=[cells(each) for each in (table.before, *table.ranked)] if table else [],
         pictures=pictures,
         ratio=judgment.case.actuator.gear.ratio(),
         made=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from mass_on_guide import MassOnGuide
 from scipy.optimize import brentq
 
 from actuator import (
@@ -25,10 +26,12 @@ from actuator import (
     simulate,
     trim,
 )
-from actuator.hunting import stuck_fraction, turning_points
+from actuator.hunting_signals import turning_points
+from actuator.hunting_trace import stuck_fraction
 from actuator.hybrid import Quantity
 from actuator.run import Statistics
-from controllers import PID
+from actuator.sensors import AngleSensor, Sensors
+from controllers import PID, Sampling
 from gear import Backlash, Bearing, Coulomb, Coupling, ExternalPair, Linear, Mesh, Shaft, Transmission
 
 CONTACT = "gear.bearings.only"
@@ -347,3 +350,106 @@ def test_a_late_step_is_judged_by_what_follows_it():
     hunting = classify(simulate(plant, 100.0, inputs={"reference": Step(time=99.8, after=0.1)}, compiled=False))
     assert hunting.verdict == "irregular"
     assert "simulate longer" in hunting.reason
+
+
+# -- trends, drift, wear --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("factor", "verdict"), [(0.99, "rest"), (0.995, "rest"), (1.008, "diverging")])
+def test_swings_that_change_by_the_same_factor_ever_again_are_no_cycle(factor, verdict):
+    time = np.linspace(0, 40, 8001)
+    hunting = classify(run_of(time, factor**time * np.sin(2 * np.pi * time)))
+    assert hunting.verdict == verdict, hunting.reason
+    assert f"by a factor {factor:.3g} in each of" in hunting.reason
+
+
+def test_a_cycle_that_has_ended_is_none():
+    time = np.linspace(0, 40, 8001)
+    assert classify(run_of(time, np.where(time < 21, np.sin(2 * np.pi * time), 0.0))).verdict == "rest"
+
+
+def test_a_small_cycle_behind_a_long_large_transient_is_found():
+    time = np.linspace(0, 40, 40_001)
+    hunting = classify(run_of(time, 2 * np.exp(-time / 4) + 2e-4 * np.sin(2 * np.pi * 5 * time)))
+    assert hunting.verdict == "limit cycle without sticking", hunting.reason
+    assert hunting.period_s == pytest.approx(0.2, rel=1e-2)
+    assert hunting.amplitude_rad == pytest.approx(2e-4, rel=0.1)  # and what is left of the transient in one period
+
+
+@pytest.mark.parametrize("duration", [28.0, 29.0, 30.0])
+def test_a_stuck_mass_under_integral_action_names_when_it_lets_go(duration):
+    plant = MassOnGuide().actuator()
+    hunting = classify(simulate(plant, duration, inputs={"reference": 1.0}, compiled=False))
+    later = simulate(plant, 60.0, inputs={"reference": 1.0}, compiled=False)
+    released = next(change.time for change in later.changes if change.before == "stuck" and change.time > duration)
+    assert hunting.verdict == "irregular"
+    # the torque grows in proportion to time while the mass stands
+    assert hunting.release_s == pytest.approx(released - duration, abs=1e-4)
+    assert f"at the present rate a contact lets go after {hunting.release_s:.3g} s" in hunting.reason
+    assert hunting.longer_s >= duration
+
+
+@pytest.mark.parametrize("duration", [10.0, 30.0])
+def test_as_much_longer_as_is_asked_for_decides(duration):
+    plant, asked = MassOnGuide().actuator(), [duration]
+    while not (hunting := classify(simulate(plant, sum(asked), inputs={"reference": 1.0}, compiled=False))).decided:
+        asked.append(hunting.longer_s)
+    assert hunting.verdict == "hunting"
+    assert len(asked) <= 5
+
+
+def test_an_integrator_with_a_dead_band_rests_with_a_standing_error_that_is_named():
+    # wider than the error of 67 mrad at which the mass without it comes to stop
+    plant = MassOnGuide(dead=0.1).actuator()
+    hunting = classify(simulate(plant, 150.0, inputs={"reference": 1.0}, compiled=False))
+    assert hunting.verdict == "rest", hunting.reason
+    assert 1e-4 < abs(hunting.standing_error_rad) < 0.1
+    assert f"{hunting.standing_error_rad:.3g} rad from its reference" in hunting.reason
+
+
+def test_wear_of_a_cycle_is_what_is_counted_by_hand():
+    corners, amplitude, _ = CYCLES["stick-slip"]
+    found = classify(periodic(corners, 3.0, cycles=20)).wear
+    assert found.load_reversals_per_h == pytest.approx(2 * 3600 / 3.0, rel=1e-3)
+    assert found.motor_reversals_per_h == pytest.approx(2 * 3600 / 3.0, rel=1e-3)
+    assert found.load_travel_per_h == pytest.approx(4 * amplitude * 3600 / 3.0, rel=1e-2)
+    assert found.motor_travel_per_h == pytest.approx(40 * amplitude * 3600 / 3.0, rel=1e-2)
+    assert math.isnan(found.current_rms) and math.isnan(found.mean_loss)
+
+
+def test_current_and_loss_are_means_over_the_period():
+    time = np.linspace(0, 30, 30_001)
+    run = run_of(time, np.sin(2 * np.pi * time))
+    run.signals["current"] = 3 + 4 * math.sqrt(2) * np.sin(2 * np.pi * time)
+    run.signals["copper_loss"] = 2 + np.sin(2 * np.pi * time)
+    run.signals["friction_loss"] = 0.5 + 0 * time
+    run.signals["gear.bearings.only.friction_loss"] = 100 + 0 * time  # is in the total already
+    found = classify(run).wear
+    assert found.current_rms == pytest.approx(5.0, rel=1e-3)
+    assert found.mean_loss == pytest.approx(2.5, rel=1e-3)
+
+
+# -- sampled drives with counts ------------------------------------------------------------------------------
+
+
+def arm(resolution):
+    """A sampled PID on an inertia, without any friction."""
+    gear = Transmission(shafts={"arm": Shaft(inertia=0.3)}, input="arm", output="arm")
+    return Actuator(
+        motor=TorqueSource(),
+        gear=gear,
+        controller=PID.for_inertia(inertia=0.3, bandwidth=20.0, filter_time=5e-3),
+        sampling=Sampling(position=2e-3, delay=1),
+        sensors=Sensors(load=AngleSensor(resolution=resolution)),
+    )
+
+
+def test_a_drive_that_cannot_rest_between_two_counts_hunts_for_its_quantizer():
+    hunting = classify(simulate(arm(1e-3), 20.0, inputs={"reference": 0.1234}, resolution=2e-3, compiled=False))
+    assert hunting.verdict == "quantizer hunting"
+    assert hunting.cycles
+    assert 2 * hunting.amplitude_rad < 3e-3
+    assert "counts of the sensor, of 0.001 rad" in hunting.reason
+    still = classify(simulate(arm(None), 20.0, inputs={"reference": 0.1234}, resolution=2e-3, compiled=False))
+    assert still.verdict == "rest"
+    assert still.standing_error_rad == pytest.approx(0, abs=1e-9)

@@ -220,6 +220,29 @@ def test_the_aileron_has_margins_at_every_loop_in_every_mode(aileron):
             assert loop[mode]["phase_deg"] > 0
 
 
+def test_the_report_on_the_aileron_explains_its_hunting(aileron):
+    name, outcome, result = aileron
+    assert result["missing"] == {}
+    margins = result["hunting_margins"]
+    assert set(margins) == {"stiction", "backlash", "integral gain"}
+    if name == "aileron-retuned":
+        assert result["orbit"] is None and result["causes"] is None and result["remedies"] is None
+        assert all(margin["factor"] is None or margin["factor"] > 1 for margin in margins.values())  # None: infinite
+        return
+    assert all(margin["factor"] < 1 for margin in margins.values())
+    orbit = result["orbit"]
+    assert orbit["period_s"] == pytest.approx(result["hunting"]["period_s"], rel=1e-3)
+    assert orbit["amplitude_rad"] == pytest.approx(result["hunting"]["amplitude_rad"], rel=1e-3)
+    assert orbit["stable"] and orbit["error_of_trivial_multiplier"] < 1e-4
+    assert all(math.hypot(mu["real"], mu["imaginary"]) < 1 for mu in orbit["multipliers"])
+    without = result["causes"]["without"]
+    assert without["integral action"]["verdict"] == "rest"
+    assert without["breakaway above sliding friction"]["verdict"] == "rest"
+    assert result["remedies"][0]["does"] == "rest"
+    assert "best remedy: " in outcome.output
+    assert "integral gain margin: -" in outcome.output
+
+
 # -- what is refused ----------------------------------------------------------------------------------------
 
 WRONG = {

@@ -523,7 +523,7 @@ def test_other_wrong_files(refusal, text, message):
 
 def test_a_missing_file_names_the_built_in_cases(tmp_path):
     with pytest.raises(
-        CaseError, match=r"none\.toml: cannot be read: No such file or directory; .* are aileron, aileron-retuned, aileron-sampled"
+        CaseError, match=r"none\.toml: cannot be read: No such file or directory; .* are aileron, aileron-retuned"
     ):
         load_case(tmp_path / "none.toml")
     with pytest.raises(CaseError, match="aleron: cannot be read"):

@@ -16,7 +16,7 @@ from mass_on_guide import MassOnGuide
 from studies import hunting_map as maps
 from studies.__main__ import main
 from studies.hunting import WrongPlan, plan_of
-from studies.hunting_ends import along, crossings
+from studies.hunting_ends import along, crossings, ends, with_boundary
 from studies.hunting_map import LABELS, Axis, Plan, compute, dataset
 from studies.hunting_settings import Setting, meaning, parameters_of
 from studies.hunting_store import PointStore
@@ -115,6 +115,15 @@ def test_lines_of_the_map_that_cross_a_boundary_are_found(plan, points):
     found = crossings(plan, points)
     assert sorted(index[1] for index in found) == [1, 2]  # with an integral gain
     assert all(points[index]["verdict"] == "hunting" for index in found)
+
+
+def test_the_exact_boundary_of_the_mass_is_its_sliding_friction(plan, points):
+    found = ends(plan, crossings(plan, points), jobs=1)
+    data = with_boundary(plan, dataset(plan, points), found)
+    # the amplitude goes to zero where breakaway friction is no larger than sliding friction
+    np.testing.assert_allclose(data.boundary.sel(corner=0, y=[4.0, 8.0]), 1.0, rtol=0, atol=1e-3)
+    assert np.isnan(data.boundary.sel(corner=0, y=0.0))
+    assert {end.kind for end in found.values()} == {"amplitude zero"}
 
 
 # -- kill and resume --------------------------------------------------------------------------------------------

@@ -1,7 +1,8 @@
 """Linear models of whole actuators, one per contact mode, with their loops and margins.
 
 Oracles: transfer functions by hand (two masses on a spring, a shaft in a bearing, a mass under PID); small sines
-simulated beside a steady motion; the margins of python-control on textbook loops; 1/(1 + L) against the closed loop.
+simulated beside a steady motion, and through the whole drive; the margins of python-control on textbook loops;
+1/(1 + L) against the closed loop.
 """
 
 import dataclasses
@@ -19,9 +20,11 @@ from actuator import (
     Ramp,
     Sine,
     TorqueSource,
+    frequency_response,
     linearize,
     loop_transfer,
     margins,
+    mode_models,
     simulate,
     trim,
 )
@@ -259,6 +262,35 @@ def test_a_small_sine_is_amplified_as_the_linear_model_says(steady, signal, ampl
     for name, response in zip(outputs, expected, strict=True):
         sine, cosine, _ = np.linalg.lstsq(shapes, run[name][late])[0]
         assert abs(complex(sine, cosine) / amplitude / response - 1) < 1e-4, name
+
+
+def test_without_stiction_a_sine_stream_through_the_aileron_is_its_linear_response():
+    frictionless = {
+        parameter.name: 0.0
+        for parameter in aileron().system().parameters
+        if parameter.name.startswith("gear.")
+        and parameter.name.endswith((".sliding", ".static", ".coulomb", ".breakaway"))
+    }
+    frequencies = [2.0, 8.0, 20.0]
+    measured = frequency_response(
+        aileron(),
+        amplitudes=[2e-4, 2e-3],
+        frequencies=frequencies,
+        seen=("load_angle", "motor_torque"),
+        sets={"frictionless": frictionless},
+        workers=1,
+    )
+    model = mode_models(aileron(), parameters=frictionless)["forward"]
+    expected = model.linear(["reference"], ["load_angle", "motor_torque"])(2j * np.pi * np.array(frequencies))[:, 0]
+    for amplitude in measured.data.amplitude:
+        response = measured.data.response.sel(amplitude=amplitude).values[0, 0].T
+        np.testing.assert_allclose(response, expected, rtol=1e-3)
+
+
+def test_a_sine_below_the_stiction_of_the_aileron_moves_nothing():
+    measured = frequency_response(aileron(), amplitudes=[2e-4, 0.05], frequencies=[10.0], workers=1)
+    assert measured.data.moves.values.ravel().tolist() == [False, True]
+    assert abs(measured.select(amplitude=2e-4).item()) < 1e-9
 
 
 # -- refusals -----------------------------------------------------------------------------------------------

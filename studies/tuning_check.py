@@ -1,0 +1,189 @@
+"""A design held against its demands by simulation, in every corner: does it hunt, does it follow, what does it draw."""
+
+import math
+from collections.abc import Callable, Mapping, MutableMapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from actuator.actuator import Actuator
+from actuator.decide import decide
+from actuator.engine import SimulationError
+from actuator.hunting import REST
+from actuator.signals import Step
+from actuator.sine_stream import SinePoint, SineStream
+from actuator.sweep import sweep
+from studies.kept import fingerprint
+from studies.specification import Corner, Demand
+
+STEPS = (0.1, 1.0, 10.0)  # of the demanded amplitude: a small move, the move itself, a large one
+BEFORE, DURATION = 0.05, 10.0  # s, when the step comes and how long is looked at first
+RESOLUTION = 2.5e-3  # s
+LONGEST = 6.0  # times the duration, for runs that do not decide
+BREAKAWAY = (".breakaway", ".static")
+ROUNDING = 1e-3  # part of the standing error by which an error at rest may exceed it: the ends of runs settle slowly
+STEP, SINE = "step", "sine"
+
+
+class Trial(NamedTuple):
+    """One simulation: a step of a size [rad], or a sine of an amplitude [rad] and frequency [Hz]."""
+
+    kind: str
+    parameters: dict[str, float]
+    size: float
+    frequency: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class CornerCheck:
+    """What the simulations of one corner show.
+
+    Attributes
+    ----------
+    corner : str
+        Its name.
+    verdicts : dict of str to str
+        By step size over the demanded amplitude and factor on breakaway friction, "x0.1, 1.3 breakaway".
+    cycle : float
+        Largest amplitude of a cycle at the factor 1 [rad]; zero where nothing hunts.
+    standing_error : float
+        Largest error at rest [rad], of those runs that rest.
+    followed : float
+        Load angle over reference at the demanded bandwidth and amplitude [-].
+    overshoot : float
+        Of the step of the demanded amplitude over its size [-].
+    peak_current : float
+        In the step of the demanded amplitude, once it has begun [A].
+    """
+
+    corner: str
+    verdicts: dict[str, str]
+    cycle: float
+    standing_error: float
+    followed: float
+    overshoot: float
+    peak_current: float
+
+    def hunts(self, factor: float) -> bool:
+        """Whether a run with this factor on breakaway friction does not come to rest."""
+        return any(verdict != REST for name, verdict in self.verdicts.items() if name.endswith(_label(factor)))
+
+
+def _label(factor: float) -> str:
+    return f"{factor:.4g} breakaway"
+
+
+class Bench:
+    """Runs trials of one actuator; another process builds its own model.
+
+    Parameters
+    ----------
+    plant : Actuator
+        What is tried.
+    """
+
+    def __init__(self, plant: Actuator) -> None:
+        self.plant, self.stream = plant, SineStream(plant=plant)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"plant": replace(self.plant)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(state["plant"])
+
+    def __call__(self, trial: Trial) -> dict[str, Any]:
+        """Verdict and numbers of a step, or gain of a sine."""
+        if trial.kind == SINE:
+            found = self.stream.measure(
+                SinePoint(amplitude=trial.size, frequency=trial.frequency, parameters=trial.parameters)
+            )
+            value = complex(*found.harmonics[0][1]) / trial.size
+            return {"followed": abs(value), "settled": found.settled}
+        try:
+            run, hunting = decide(
+                self.plant,
+                DURATION,
+                inputs={"reference": Step(time=BEFORE, after=trial.size)},
+                longest=LONGEST,
+                parameters=trial.parameters,
+                resolution=RESOLUTION,
+            )
+        except SimulationError as error:
+            return {"verdict": "failed", "reason": str(error)}
+        after = run.t >= BEFORE
+        return {
+            "verdict": hunting.verdict,
+            "reason": hunting.reason,
+            "amplitude": hunting.amplitude_rad if hunting.cycles else 0.0,
+            "error": abs(hunting.standing_error_rad) if hunting.verdict == REST else 0.0,
+            "overshoot": float(np.max(run["load_angle"])) / trial.size - 1,
+            "peak_current": float(np.abs(run["current"][after]).max()),
+        }
+
+
+def trials(
+    corner: Corner, design: Mapping[str, float], demand: Demand, defaults: Mapping[str, float]
+) -> dict[str, Trial]:
+    """What is simulated in a corner, by what it is called."""
+    parameters = corner.parameters | dict(design)
+    found = {}
+    for factor in dict.fromkeys((1.0, demand.stiction_margin)):
+        values = dict(defaults) | parameters
+        sticky = {name: factor * value for name, value in values.items() if name.endswith(BREAKAWAY)}
+        for part in STEPS:
+            found[f"x{part:g}, {_label(factor)}"] = Trial(STEP, parameters | sticky, part * demand.sine)
+    found[SINE] = Trial(SINE, parameters, demand.sine, demand.bandwidth)
+    return found
+
+
+def check_corners(  # noqa: PLR0913 - what is checked, and how it is run
+    plant: Actuator,
+    corners: Sequence[Corner],
+    design: Mapping[str, float],
+    demand: Demand,
+    *,
+    done: MutableMapping[str, dict[str, Any]] | None = None,
+    workers: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[CornerCheck]:
+    """Simulate a design in every corner.
+
+    Parameters
+    ----------
+    plant : Actuator
+        With all parameters of the design.
+    corners : sequence of Corner
+        Where.
+    design : mapping of str to float
+        Gains by name.
+    demand : Demand
+        Amplitude, bandwidth and stiction margin.
+    done, workers, progress
+        As for `sweep`.
+    """
+    defaults = {parameter.name: float(parameter.default) for parameter in plant.system().parameters}
+    wanted = {corner.name: trials(corner, design, demand, defaults) for corner in corners}
+    keys = {
+        (corner, name): fingerprint([trial.kind, defaults | trial.parameters, trial.size, trial.frequency])
+        for corner, named in wanted.items()
+        for name, trial in named.items()
+    }
+    points = {keys[corner, name]: trial for corner, named in wanted.items() for name, trial in named.items()}
+    results = sweep(Bench(plant), points, done=done, workers=workers, progress=progress)
+    return [_summed(corner, {name: results[keys[corner, name]] for name in named}) for corner, named in wanted.items()]
+
+
+def _summed(corner: str, found: Mapping[str, dict[str, Any]]) -> CornerCheck:
+    steps = {name: result for name, result in found.items() if name != SINE}
+    plain = [result for name, result in steps.items() if name.endswith(_label(1.0))]
+    own = steps[f"x1, {_label(1.0)}"]
+    return CornerCheck(
+        corner=corner,
+        verdicts={name: result["verdict"] for name, result in steps.items()},
+        cycle=max(result.get("amplitude", 0.0) for result in plain),
+        standing_error=max(result.get("error", 0.0) for result in steps.values()),
+        followed=found[SINE]["followed"],
+        overshoot=own.get("overshoot", math.nan),
+        peak_current=own.get("peak_current", math.nan),
+    )

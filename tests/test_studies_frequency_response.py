@@ -1,0 +1,291 @@
+"""The frequency-response study: what is measured, kept, gone on with, written and refused.
+
+Oracles: a mass under a PID without friction, whose response to a sine has a closed form; limits that are known to be
+kept or missed by it; a study that was killed finished without computing a point twice.
+"""
+
+import csv
+import json
+import math
+
+import numpy as np
+import pytest
+import xarray
+from click.testing import CliRunner
+
+from studies import frequency_response as module
+from studies.__main__ import main
+from studies.files import CaseError
+from studies.frequency_mask import Limit, checked, load_mask, phase_of
+
+INERTIA, GAIN, RATE, INTEGRAL = 1.0, 100.0, 8.0, 50.0
+FREQUENCIES = (0.5, 1.0, 2.0)  # Hz
+STROKE, AMPLITUDE = 40.0, 0.01  # deg, of it
+MASS = f"""
+title = "A mass under a PID"
+
+[motor]
+type = "TorqueSource"
+
+[gear]
+input = "mass"
+output = "mass"
+
+[gear.shafts]
+mass = {{ inertia = {INERTIA} }}
+
+[controller]
+type = "PID"
+proportional = {GAIN}
+integral = {INTEGRAL}
+derivative = {RATE}
+
+[scenario]
+duration = 5
+
+[scenario.inputs.reference]
+type = "Constant"
+value = 1.0
+"""
+MASK = """
+title = "For a test"
+
+[[limits]]
+amplitude = 0.01
+frequencies = [0.4, 3.0]
+gain_low_db = [-3.0, -3.0]
+gain_high_db = [{high}, {high}]
+phase_low_deg = [-150, -150]
+"""
+
+
+def response(frequency):
+    """Load angle over reference of the mass; the derivative is that of the load alone."""
+    s = 2j * math.pi * np.asarray(frequency)
+    return (GAIN + INTEGRAL / s) / (INERTIA * s**2 + RATE * s + GAIN + INTEGRAL / s)
+
+
+def invoke(*arguments):
+    """Run the command line in this process."""
+    return CliRunner().invoke(main, ["frequency-response", *(str(argument) for argument in arguments)])
+
+
+def options(folder, mask="kept.toml", amplitudes="1"):
+    """Of a small study."""
+    return (
+        folder / "mass.toml", "--mask", folder / mask, "--stroke", STROKE, "--amplitudes", amplitudes,
+        "--frequencies", 0.5, 2, 3, "--torque", 5, "--jobs", 1,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A case, two masks, and the results of a study of it."""
+    path = tmp_path_factory.mktemp("mass")
+    (path / "mass.toml").write_text(MASS, encoding="utf-8")
+    (path / "heavier.toml").write_text(
+        'base = "mass.toml"\ntitle = "A heavier mass"\n[gear.shafts]\nmass = { inertia = 2.0 }\n', encoding="utf-8"
+    )
+    (path / "kept.toml").write_text(MASK.format(high=6), encoding="utf-8")
+    (path / "missed.toml").write_text(MASK.format(high=0.5), encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def outcome(folder):
+    """Of the study, with its files in folder/out."""
+    return invoke(*options(folder), "--out", folder / "out")
+
+
+def test_the_sines_are_those_of_the_closed_form(folder, outcome):
+    assert outcome.exit_code == 0, outcome.output
+    data = xarray.open_dataset(folder / "out" / "responses.nc", engine="scipy").isel(case=0, set=0, load=0, output=0)
+    found = data.response_real.values + 1j * data.response_imaginary.values
+    np.testing.assert_allclose(data.amplitude, [math.radians(AMPLITUDE * STROKE)])
+    np.testing.assert_allclose(data.frequency, FREQUENCIES)
+    np.testing.assert_allclose(found[0], response(FREQUENCIES), rtol=1e-3)
+    with (folder / "out" / "responses.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    np.testing.assert_allclose([float(row["gain_db"]) for row in rows], 20 * np.log10(abs(found[0])), rtol=1e-9)
+
+
+def test_the_compliance_is_that_of_the_closed_form(folder, outcome):
+    with (folder / "out" / "stiffness.csv").open(newline="", encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if row["state"] == "powered"]
+    s = 2j * math.pi * np.array([float(row["frequency_Hz"]) for row in rows])
+    stiffness = abs(INERTIA * s**2 + GAIN + INTEGRAL / s + RATE * s)
+    np.testing.assert_allclose([float(row["stiffness_Nm_per_rad"]) for row in rows], stiffness, rtol=1e-3)
+
+
+def test_the_margins_are_those_of_the_closed_form(folder, outcome):
+    result = json.loads((folder / "out" / "result.json").read_text())["cases"]["mass"]
+    (crossing,) = result["margins"]["torque_reference"]["forward"]["gain_crossings"]
+    s = 1j * crossing["frequency"]
+    loop = (GAIN + INTEGRAL / s + RATE * s) / (INERTIA * s**2)
+    assert abs(loop) == pytest.approx(1, rel=1e-6)
+    assert crossing["phase_rad"] == pytest.approx(math.pi + np.angle(loop), rel=1e-6)
+
+
+def test_everything_is_written_and_the_page_needs_nothing_else(folder, outcome):
+    names = {path.name for path in (folder / "out").iterdir() if path.suffix != ".jsonl"}
+    assert {"report.html", "result.json", "findings.txt", "responses.csv", "stiffness.csv", "margins.csv"} <= names
+    assert {"responses.nc", "stiffness_powered.nc", "stiffness_unpowered.nc", "family.png", "test_step.png"} <= names
+    page = (folder / "out" / "report.html").read_text(encoding="utf-8")
+    result = json.loads((folder / "out" / "result.json").read_text())
+    assert "src=" in page and page.count("src=") == page.count('src="data:image/png;base64,')
+    for words in (result["cases"]["mass"]["model"], result["source"], "For a test", "gear.shafts.mass.inertia", "kg m^2"):
+        assert words in page
+    assert not [name for name in names if name.startswith(".writing")]
+
+
+def test_a_mask_is_kept_or_missed_and_the_second_study_computes_nothing(folder, outcome, monkeypatch):
+    peak = 20 * np.log10(abs(response(FREQUENCIES))).max()
+    assert 0.5 < peak < 6  # dB: one mask is missed and the other kept
+    assert "mass: the mask is kept." in outcome.output
+
+    def never(*arguments, **others):
+        raise AssertionError("a finished point was computed again")
+
+    monkeypatch.setattr("actuator.sine_stream.SineStream.measure", never)
+    monkeypatch.setattr("studies.frequency_tests.BenchWork.__call__", never)
+    again = invoke(*options(folder, "missed.toml"), "--out", folder / "out")
+    assert again.exit_code == 0, again.output
+    assert "mass: the mask is missed: gain, from above, at 0.4 deg" in again.output
+    rows = json.loads((folder / "out" / "result.json").read_text())["cases"]["mass"]["checks"]
+    slack = {row["side"]: row["slack"] for row in rows}
+    assert slack["gain_high_db"] == pytest.approx(0.5 - peak, abs=0.01)
+    assert slack["gain_low_db"] > 0 and not all(row["met"] for row in rows)
+
+
+def test_a_killed_study_goes_on_where_it_stopped(folder, outcome, tmp_path, monkeypatch):
+    (kept,) = (folder / "out").glob("finished-*.jsonl")
+    lines = kept.read_text().splitlines(keepends=True)
+    dropped = [line for line in lines if "at 2 Hz" in line]
+    assert dropped
+    left = "".join(line for line in lines if line not in dropped)
+    (tmp_path / kept.name).write_text(left + '{"key": "half')  # what a kill in the middle of a write leaves
+    computed = []
+    measure = module_measure()
+    monkeypatch.setattr(
+        "actuator.sine_stream.SineStream.measure", lambda self, point: computed.append(point) or measure(self, point)
+    )
+    again = invoke(*options(folder), "--out", tmp_path)
+    assert again.exit_code == 0, again.output
+    assert len(computed) == len(dropped) and {point.frequency for point in computed} == {2.0}
+    assert (tmp_path / "responses.csv").read_text() == (folder / "out" / "responses.csv").read_text()
+
+
+def module_measure():
+    """What measures a sine, before it is replaced."""
+    from actuator.sine_stream import SineStream
+
+    return SineStream.measure
+
+
+def test_a_second_case_and_a_record_are_laid_beside_it(folder, outcome, tmp_path):
+    (kept,) = (folder / "out").glob("finished-*.jsonl")
+    (tmp_path / kept.name).write_text(kept.read_text())
+    time = np.arange(0, 30, 0.01)
+    reference = np.random.default_rng(0).standard_normal(len(time))
+    table = np.column_stack([time, reference, 0.5 * reference])
+    np.savetxt(tmp_path / "rig.csv", table, delimiter=",", header="time,reference,response", comments="")
+    beside = invoke(
+        *options(folder), "--against", folder / "heavier.toml", "--measured", tmp_path / "rig.csv", "--out", tmp_path
+    )
+    assert beside.exit_code == 0, beside.output
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "A mass under a PID beside A heavier mass" in page and "Measured records" in page and "rig" in page
+    assert "Shaded where they differ" in page and page.count('class="other"') == 1
+    data = xarray.open_dataset(tmp_path / "responses.nc", engine="scipy")
+    assert data.case.values.tolist() == ["mass", "heavier"]
+    assert (tmp_path / "beside.png").exists()
+
+
+# -- limits ---------------------------------------------------------------------------------------------------
+
+
+def test_limits_are_straight_over_the_logarithm_of_frequency():
+    limit = Limit(amplitude=0.1, frequencies=(1.0, 100.0), gain_low_db=(0.0, -6.0))
+    np.testing.assert_allclose(limit.at("gain_low_db", np.array([1.0, 10.0, 100.0])), [0.0, -3.0, -6.0], atol=1e-12)
+    hertz, moves = np.array([0.5, 1.0, 10.0]), np.ones(3, bool)
+    (check,) = checked(limit, hertz, np.array([1e-6, 1.1, 10 ** (-4 / 20)], complex), moves)
+    assert check.slack == pytest.approx(-1.0) and check.frequency == 10.0 and check.points == 2 and not check.met
+
+
+def test_what_does_not_move_or_has_failed_keeps_to_no_lower_limit():
+    limit = Limit(amplitude=0.1, frequencies=(1.0, 2.0), gain_low_db=(-60.0, -60.0), phase_low=(-9.0, -9.0))
+    for value, moves in ((1e-15, [False, True]), (math.nan, [True, True])):
+        checks = checked(limit, np.array([1.0, 2.0]), np.array([value, 1.0], complex), np.array(moves))
+        assert [check.slack for check in checks] == [-math.inf, -math.inf]
+
+
+def test_phase_starts_between_minus_270_and_90_deg_and_has_no_jumps():
+    phases = np.radians([-170.0, -190.0, -350.0])
+    np.testing.assert_allclose(phase_of(np.exp(1j * phases), np.ones(3, bool)), phases)
+
+
+def test_the_built_in_mask_is_read():
+    assert [limit.amplitude for limit in load_mask().limits] == [0.01, 0.1]
+
+
+WRONG_LIMITS = {
+    "frequencies that fall": ("frequencies = [2, 1]\ngain_low_db = [0, 0]", "must be > 0 Hz and ascend"),
+    "a value too few": ("frequencies = [1, 2]\ngain_low_db = [0]", "must have a value at each of the 2 frequencies"),
+    "no limit": ("frequencies = [1, 2]", "needs at least one of gain_low_db"),
+    "an unknown key": ("frequencies = [1]\ngain_lo_db = [0]", "did you mean gain_low_db"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG_LIMITS)
+def test_a_wrong_mask_is_refused(name, tmp_path):
+    text, message = WRONG_LIMITS[name]
+    path = tmp_path / "mask.toml"
+    path.write_text(f'title = "x"\n[[limits]]\namplitude = 0.01\n{text}\n')
+    with pytest.raises(CaseError, match=message):
+        load_mask(path)
+
+
+# -- what is refused --------------------------------------------------------------------------------------------
+
+WRONG = {
+    "an unknown case": (("ailerons",), "cannot be read"),
+    "amplitudes that are no numbers": (("--amplitudes", "1;2"), "--amplitudes are numbers with commas"),
+    "an amplitude beyond the stroke": (("--amplitudes", "80"), "at most 50 % of the stroke, and at least one, got 80 %"),
+    "frequencies that fall": (("--frequencies", 2, 1, 3), "--frequencies are FROM TO COUNT with 0 < FROM <= TO"),
+    "no frequency within the mask": (("--frequencies", 100, 200, 2), "no frequency is within limit 1 of the mask"),
+    "a mask that is not there": (("--mask", "nowhere.toml"), "cannot be read"),
+    "a record that is not there": (("--measured", "nowhere.csv"), "nowhere.csv: cannot be read"),
+    "the same case twice": (("--against", "aileron"), "both cases are called aileron"),
+    "no stroke": (("--stroke", 0), "Invalid value for '--stroke'"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_wrong_study_is_refused_in_one_line_and_nothing_is_written(name, tmp_path):
+    arguments, message = WRONG[name]
+    found = invoke(*arguments, "--out", tmp_path / "out")
+    assert found.exit_code == 2, found.output
+    assert message in found.output
+    assert isinstance(found.exception, SystemExit)
+    assert "Invalid value" in message or len(found.output.strip().splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_motor_without_limits_needs_a_torque(folder, tmp_path):
+    found = invoke(folder / "mass.toml", "--out", tmp_path / "out")
+    assert found.exit_code == 2
+    assert "its motor has no largest torque; give the one at the load with --torque" in found.output
+
+
+def test_a_case_without_a_controller_has_no_response(folder, tmp_path):
+    path = tmp_path / "open.toml"
+    path.write_text(MASS[: MASS.index("[controller]")] + "[scenario]\nduration = 1\n")
+    with pytest.raises(module.WrongRequest, match="open: has no position controller"):
+        module.load_positioner(path)
+
+
+def test_help_tells_the_options():
+    found = invoke("--help")
+    assert found.exit_code == 0
+    for word in ("--against", "--measured", "--mask", "--amplitudes", "FROM TO COUNT", "goes on where it stopped"):
+        assert word in " ".join(found.output.split())

@@ -1,0 +1,146 @@
+"""Robustness: Wilson's interval, spreads, indices of a linear function, and a mass on a guide whose answer is known.
+
+Oracles: Wilson's interval against its defining equation; Sobol' indices of a sum, a_k^2/sum a^2; a mass on a guide
+that hunts if and only if its breakaway friction exceeds its sliding friction.
+"""
+
+import math
+import sys
+from statistics import NormalDist
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from mass_on_guide import MassOnGuide
+
+from actuator import classify, simulate
+from studies.__main__ import main
+from studies.kept import Kept
+from studies.robustness import MissingLibrary, factors, robustness, spread, wilson
+from studies.specification import Tolerance
+
+pytest.importorskip("SALib")
+
+
+def spreads(**sizes):
+    return [Tolerance(parameter=name, size=size) for name, size in sizes.items()]
+
+
+@pytest.mark.parametrize(("happened", "trials"), [(0, 10), (3, 10), (10, 10), (37, 200)])
+def test_wilson_interval_is_where_the_score_is_z(happened, trials):
+    found, z, share = wilson(happened, trials), 1.959963984540054, happened / trials
+    for edge in (found.low, found.high):
+        if 0 < edge < 1:
+            assert abs(share - edge) == pytest.approx(z * math.sqrt(edge * (1 - edge) / trials), rel=1e-9)
+    assert found.low <= share <= found.high
+
+
+def test_wilson_refuses_what_is_no_count():
+    with pytest.raises(ValueError, match="got 3 of 2"):
+        wilson(3, 2)
+
+
+def test_spreads_have_their_moments():
+    shares = (np.arange(2000) + 0.5)[:, None] / 2000 * np.ones((1, 2))
+    tolerances = [Tolerance(parameter="a", size=0.3), Tolerance(parameter="b", spread="normal", size=0.1)]
+    found = factors(shares, tolerances)
+    assert found.mean(axis=0) == pytest.approx([1, 1], abs=1e-9)
+    # a normal distribution cut at its thousandths has the variance 1 - 2 a density(a)/0.998
+    cut = NormalDist().inv_cdf(0.999)
+    left = math.sqrt(1 - 2 * cut * NormalDist().pdf(cut) / 0.998)
+    assert found.std(axis=0) == pytest.approx([0.3 / math.sqrt(3), 0.1 * left], rel=1e-3)
+    assert abs(found[:, 0] - 1).max() <= 0.3
+
+
+def test_breakaway_is_never_below_sliding_friction():
+    values = {"x.coulomb": 1.0, "x.breakaway": 1.1, "y.gap": 2.0}
+    found = spread(values, [Tolerance(parameter="*.coulomb", size=0.5)], [1.4])
+    assert found == {"x.coulomb": 1.4, "x.breakaway": 1.4}
+    with pytest.raises(KeyError, match="no parameter fits 'none'"):
+        spread(values, [Tolerance(parameter="none", size=0.5)], [1.0])
+
+
+def summed(parameters):
+    return {"sum": 3 * parameters["a"] + 2 * parameters["b"] + parameters["c"]}
+
+
+def test_indices_of_a_sum_in_closed_form():
+    nominal = {"a": 1.0, "b": 1.0, "c": 1.0}
+    found = robustness(
+        summed,
+        nominal,
+        spreads(c=0.1, a=0.1, b=0.1),
+        events={"large": lambda result: result["sum"] > 6},
+        measures=("sum",),
+        base=512,
+        workers=1,
+    )
+    rows = found.influences["sum"]
+    assert [row.parameter for row in rows] == ["a", "b", "c"]
+    assert [row.total for row in rows] == pytest.approx([9 / 14, 4 / 14, 1 / 14], abs=0.02)
+    large = found.probabilities["large"]
+    assert large.trials == 1024
+    assert large.low < 0.5 < large.high
+
+
+def guided(parameters):
+    run = simulate(MassOnGuide().actuator(), 30.0, inputs={"reference": 0.3}, parameters=parameters, resolution=0.01)
+    verdict = classify(run)
+    return {"verdict": verdict.verdict, "cycle": verdict.amplitude_rad if verdict.cycles else 0.0}
+
+
+def test_a_mass_on_a_guide_hunts_with_the_probability_of_stiction(tmp_path):
+    # breakaway = max(1.05 u, coulomb), u uniform in 0.7 to 1.3: it exceeds coulomb = 1 with probability 0.58
+    nominal = {q.name: float(q.default) for q in MassOnGuide(breakaway=1.05).actuator().system().parameters}
+    options = {
+        "events": {"hunting": lambda result: result["verdict"] != "rest"},
+        "measures": ("cycle",),
+        "base": 8,
+        "seed": 3,
+        "workers": 1,
+    }
+    path = tmp_path / "kept.jsonl"
+    found = robustness(guided, nominal, spreads(**{"gear.bearings.guide.breakaway": 0.3}), done=Kept(path), **options)
+    hunting = found.probabilities["hunting"]
+    assert hunting.low < (1.3 - 1 / 1.05) / 0.6 < hunting.high
+    for point, result in zip(found.points, found.results, strict=True):
+        assert (result["verdict"] != "rest") == (1.05 * point["gear.bearings.guide.breakaway"] > 1.0)
+
+    def never(parameters):
+        raise AssertionError("what is kept is not run again")
+
+    again = robustness(never, nominal, spreads(**{"gear.bearings.guide.breakaway": 0.3}), done=Kept(path), **options)
+    assert again.probabilities == found.probabilities
+
+
+@pytest.mark.parametrize(
+    ("tolerances", "base", "says"),
+    [([], 8, "at least one tolerance"), (spreads(a=0.1), 12, "power of two, got 12")],
+)
+def test_wrong_tasks(tolerances, base, says):
+    with pytest.raises(ValueError, match=says):
+        robustness(summed, {"a": 1.0}, tolerances, events={}, measures=(), base=base)
+
+
+def test_wrong_spread():
+    with pytest.raises(ValueError, match='must be "uniform" or "normal", got \'triangle\''):
+        Tolerance(parameter="a", spread="triangle", size=0.1)
+
+
+def test_without_the_library_it_says_how_to_get_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "SALib.analyze", None)
+    with pytest.raises(MissingLibrary, match=r"pip install 'geared-actuator\[robustness\]'"):
+        robustness(summed, {"a": 1.0}, spreads(a=0.1), events={}, measures=())
+
+
+def test_command_line_says_what_is_wrong_in_one_line(tmp_path):
+    for arguments, says in (
+        (["nothing"], "the built-in ones are"),
+        (["aileron", "--corner", "hot"], "no corner has 'hot' in its name"),
+        (["aileron", "--gains", str(tmp_path / "none.json")], "is no result.json of a tuning"),
+    ):
+        ended = CliRunner().invoke(main, ["robustness", *arguments, "--out", str(tmp_path)])
+        assert ended.exit_code == 2
+        assert says in ended.output
+        assert len(ended.output.strip().splitlines()) == 1
+    assert "--seed" in CliRunner().invoke(main, ["robustness", "--help"]).output

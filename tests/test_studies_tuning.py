@@ -1,0 +1,409 @@
+"""Tuning: derivatives against differences, loops against `loop_transfer`, optima in closed form, a small study.
+
+Oracles: an inertia behind an ideal current loop under P and PI, whose step compliance, bandwidth and optimum are closed
+forms, with the multiplier of the demand that decides; difference quotients; `loop_margins`.
+"""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from actuator import Actuator, CurrentSource, Load, TorqueSource, loop_transfer, margins, trim
+from actuator.gain_models import gain_model
+from controllers import Cascade, IntegralRemedies, Sampling
+from controllers.pid import PI, PID, P
+from gear import Bearing, Shaft, Transmission
+from studies import CaseError, load_case
+from studies.__main__ import main
+from studies.kept import Kept, fingerprint
+from studies.specification import Change, Corner, Demand, Specification, Tuning, load_specification
+from studies.tuning import (
+    DEAD_BAND,
+    INTEGRAL,
+    POSITION,
+    SPEED,
+    Active,
+    NotTunable,
+    closed_form,
+    dead_banded,
+    design,
+    inertia_at_motor,
+    shortfalls,
+    tune,
+    twins_of,
+    with_dead_band,
+    without_dead_band,
+)
+from studies.tuning_check import check_corners
+from studies.tuning_measures import LOOPS, corner_modes, measures, worst
+
+GAINS = (POSITION, SPEED, INTEGRAL)
+INPUTS = ("reference", "load_torque", "inject.speed_reference", "inject.torque_reference")
+OUTPUTS = ("load_angle", "current", "speed_reference", "torque_reference")
+FREQUENCIES = np.logspace(1, 3.5, 40)  # below, T = -1 but for rounding, and so is the difference quotient of L
+INERTIA, COULOMB, BREAKAWAY = 0.01, 0.1, 0.16
+
+
+def servo(gain=20.0, proportional=0.8, integral=8.0, coulomb=COULOMB, breakaway=BREAKAWAY):
+    """One inertia with friction behind a motor that gets its torque at once."""
+    bearings = {"shaft": Bearing(shaft="shaft", coulomb=coulomb, breakaway=breakaway, viscous=0.0)}
+    gear = Transmission(shafts={"shaft": Shaft(inertia=INERTIA / 2)}, bearings=bearings, input="shaft", output="shaft")
+    law = PI(proportional=proportional, integral=integral)
+    controller = Cascade(position=P(gain=gain), speed=law, current=None, speed_limit=1e3)
+    motor = CurrentSource(torque_constant=1.0, inertia=INERTIA / 2)
+    return Actuator(name="servo", motor=motor, gear=gear, load=Load(), controller=controller)
+
+
+@pytest.fixture(scope="module")
+def aileron():
+    return load_case("aileron").actuator
+
+
+@pytest.fixture(scope="module")
+def one():
+    return servo()
+
+
+def demand(**changed):
+    usual = {
+        "stroke": 1.0,
+        "amplitude": 0.05,
+        "bandwidth": 1.0,
+        "gain_margin": 1.5,
+        "phase_margin": 0.5,
+        "delay_margin": 1e-3,
+        "overshoot": 0.5,
+        "stiffness": 0.1,
+        "peak_current": 100.0,
+        "standing_error": 0.1,
+        "stiction_margin": 1.5,
+    }
+    return Demand(**{**usual, **changed})
+
+
+def model_at(plant, gains, word="forward", names=GAINS):
+    point = trim(plant, word, inputs={"reference": 0.1}, parameters=dict(zip(names, gains, strict=True)))
+    return point, gain_model(point, names, INPUTS, OUTPUTS)
+
+
+# -- exact derivatives ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("at", LOOPS)
+def test_loop_and_its_derivatives_by_gains(aileron, at):
+    gains = (60.0, 0.0072, 0.36)
+    point, model = model_at(aileron, gains)
+    loop = model.loop(at, FREQUENCIES)
+    assert loop.value == pytest.approx(loop_transfer(point, at)(1j * FREQUENCIES), rel=1e-7)
+    for k, gain in enumerate(gains):
+        stencil = []
+        for step in (-2, -1, 1, 2):
+            changed = [*gains[:k], gain * (1 + 3e-3 * step), *gains[k + 1 :]]
+            stencil.append(model_at(aileron, changed)[1].loop(at, FREQUENCIES).value)
+        quotient = (stencil[0] - 8 * stencil[1] + 8 * stencil[2] - stencil[3]) / (36e-3 * gain)
+        size = abs(quotient) + 1e-3 * abs(loop.value) / gain
+        assert (abs(loop.slopes[:, k] - quotient) / size).max() < 1e-6
+    stencil = [model.loop(at, FREQUENCIES * (1 + 3e-3 * step)).value for step in (-2, -1, 1, 2)]
+    quotient = (stencil[0] - 8 * stencil[1] + 8 * stencil[2] - stencil[3]) / (36e-3 * FREQUENCIES)
+    assert loop.by_frequency == pytest.approx(quotient, rel=1e-6)
+
+
+def test_an_operating_point_that_moves_with_the_gains_is_accounted_for():
+    # gravity: the stiffness at the load follows the angle, and that the gain, as there is no integral
+    from actuator import Gravity
+
+    plant = servo(integral=0.0)
+    plant = replace(plant, load=Load(gravity=Gravity(moment=0.5)))
+
+    def compliance(gain):
+        point = trim(plant, "forward", inputs={"reference": 0.4}, parameters={POSITION: gain})
+        return gain_model(point, (POSITION,), ("load_torque",), ("load_angle",)).response(
+            "load_torque", "load_angle", [3.0]
+        )
+
+    exact = compliance(20.0)
+    quotient = (compliance(20.01).value - compliance(19.99).value) / 0.02
+    assert exact.slopes[:, 0] == pytest.approx(quotient, rel=1e-6)
+    point = trim(plant, "forward", inputs={"reference": 0.4}, parameters={POSITION: 20.0})
+    frozen = replace(gain_model(point, (POSITION,), ("load_torque",), ("load_angle",)))
+    assert abs(frozen.slopes[0]).max() > 0
+
+
+def test_step_response_and_its_derivatives(one):
+    _, model = model_at(one, (20.0, 0.8, 8.0))
+    found = model.step_at("reference", "load_angle", 0.05)
+    assert model.steps("reference", "load_angle", 0.01, 6)[5] == pytest.approx(float(found.value), rel=1e-9)
+    for k, gain in enumerate((20.0, 0.8, 8.0)):
+        ends = []
+        for sign in (1, -1):
+            gains = [20.0, 0.8, 8.0]
+            gains[k] = gain * (1 + sign * 1e-4)
+            ends.append(float(model_at(one, gains)[1].step_at("reference", "load_angle", 0.05).value))
+        assert found.slopes[k] == pytest.approx((ends[0] - ends[1]) / (2e-4 * gain), rel=1e-6)
+
+
+def test_every_measure_has_exact_slopes(one):
+    gains = dict(zip(GAINS, (20.0, 0.8, 30.0), strict=True))
+    modes = corner_modes(without_dead_band(one), Corner("", {}), 1.5, gains)
+    middle = measures(modes, gains, demand(), {})
+    for k, name in enumerate(gains):
+        up, down = (
+            measures(modes, {**gains, name: gains[name] * math.exp(step)}, demand(), {}) for step in (1e-5, -1e-5)
+        )
+        for here, above, below in zip(middle, up, down, strict=True):
+            assert here.slopes[k] == pytest.approx((above.slack - below.slack) / 2e-5, rel=1e-5, abs=1e-6), here.name
+
+
+def test_margins_are_those_of_loop_margins(aileron):
+    gains = dict(zip(GAINS, (60.0, 0.0072, 0.36), strict=True))
+    modes = corner_modes(aileron, Corner("", {}), 1.0, gains)
+    found = {(m.name, m.mode): m.value for m in measures(modes, gains, demand(), {})}
+    for at in LOOPS:
+        expected = margins(loop_transfer(modes.points["forward"], at))
+        words = at.replace("_", " ")
+        assert found[f"phase margin at {words}", "forward"] == pytest.approx(expected.phase_rad, rel=1e-6)
+        assert found[f"delay margin at {words}", "forward"] == pytest.approx(expected.delay_s, rel=1e-6)
+        either_way = min(max(crossing.gain, 1 / crossing.gain) for crossing in expected.phase_crossings)
+        assert found[f"gain margin at {words}", "forward"] == pytest.approx(min(either_way, 100.0), rel=1e-6)
+
+
+# -- closed forms -----------------------------------------------------------------------------------------
+
+
+def test_friction_and_what_a_release_sets_free(one):
+    modes = corner_modes(without_dead_band(one), Corner("", {}), 1.5, {})
+    assert modes.friction == pytest.approx(COULOMB, rel=1e-9)
+    assert modes.released["forward"] == pytest.approx(1.5 * BREAKAWAY - COULOMB, rel=1e-9)
+
+
+def test_slip_and_bandwidth_in_closed_form(one):
+    # J s^2 + Kp s + Kp g = 0 with poles -a, -b and no integral: a step of torque ends at 1/(Kp g) from below
+    gains = {POSITION: 10.0, SPEED: 0.5}
+    parameters = {INTEGRAL: 1e-12}
+    modes = corner_modes(without_dead_band(one), Corner("", parameters), 1.5, gains)
+    found = worst(measures(modes, gains, demand(), {}))
+    assert found["slip"].value == pytest.approx((1.5 * BREAKAWAY - COULOMB) / 5.0, rel=1e-6)
+    s = 2j * math.pi
+    plain = INERTIA * s**2 + 0.5 * s + 5.0
+    opposed = 1j * 4 * math.sqrt(2) * COULOMB / (math.pi * 0.05)
+    assert found["bandwidth"].value == pytest.approx(abs(5.0 / (plain + opposed)), rel=1e-9)
+
+
+def test_start_in_closed_form(aileron, one):
+    assert inertia_at_motor(one) == pytest.approx(INERTIA)
+    rotor, pinion, idler, surface = 2e-5, 2e-5, 5e-5 / 5**2, (5e-4 + 0.03) / 35**2
+    assert inertia_at_motor(aileron) == pytest.approx(rotor + pinion + idler + surface, rel=1e-9)
+    start = closed_form(one, demand())
+    rate = 2 * math.pi * 1.5
+    assert start[POSITION] == pytest.approx(rate)
+    assert start[SPEED] == pytest.approx(INERTIA * 5 * rate)
+    assert start[INTEGRAL] == pytest.approx(INERTIA * 4 * rate * rate)
+
+
+# -- the optimum ------------------------------------------------------------------------------------------
+
+
+def specification(**changed):
+    return Specification(
+        title="", case="", demand=demand(**changed), tuning=Tuning(gains=(POSITION, SPEED), dead_band=True)
+    )
+
+
+def test_the_optimum_lies_where_delay_and_phase_let_it(one):
+    # without an integral D = H/(Kp g): the speed loop Kp/(J s) (1 + g/s) is as fast as the delay margin allows
+    task = specification(peak_current=1e4)
+    start = {POSITION: 10.0, SPEED: 0.3}
+    modes = corner_modes(without_dead_band(one), Corner("only", {INTEGRAL: 1e-12}), 1.5, start)
+    found = design([modes], start, task)
+    names = [each.name for each in found.active]
+    assert "slip" in names
+    assert any("delay" in name or name == "overshoot" for name in names)
+    again = design([modes], {POSITION: 20.0, SPEED: 0.6}, task)
+    assert again.standing_error == pytest.approx(found.standing_error, rel=1e-4)
+
+
+def test_a_multiplier_is_what_the_demand_costs(one):
+    start = {POSITION: 10.0, SPEED: 0.3}
+    modes = corner_modes(without_dead_band(one), Corner("only", {INTEGRAL: 1e-12}), 1.5, start)
+    # peak current = friction + sine * g * Kp at the first instant: the product of the gains is what it bounds
+    limit = 2.0
+    found = design([modes], start, specification(peak_current=limit))
+    current = next(each for each in found.active if each.name == "peak current")
+    other = design([modes], start, specification(peak_current=limit * 0.99))
+    assert math.log(other.standing_error / found.standing_error) == pytest.approx(
+        0.01005 * current.multiplier, rel=0.02
+    )
+    # D = H/(Kp g) and peak = friction + 0.05 Kp g: both known
+    assert found.standing_error == pytest.approx((1.5 * BREAKAWAY - COULOMB) / ((limit - COULOMB) / 0.05), rel=0.01)
+    assert current.multiplier == pytest.approx(limit / (limit - COULOMB), rel=0.01)
+    assert "1 % tighter costs 1.0" in current.cost
+
+
+def test_demands_that_exclude_each_other(one):
+    start = {POSITION: 10.0, SPEED: 0.3}
+    modes = corner_modes(without_dead_band(one), Corner("only", {INTEGRAL: 1e-12}), 1.5, start)
+    with pytest.raises(NotTunable, match=r"no gains meet all demands at once; nearest: .*standing error"):
+        design([modes], start, specification(peak_current=0.3, standing_error=1e-3))
+
+
+def test_costs_in_words():
+    assert "1 deg more costs 1.76 %" in Active("phase margin at x", "", "", 1.0, "rad", 1.0).cost
+    assert "1 dB more costs 12.2 %" in Active("gain margin at x", "", "", 1.0, "-", 1.0).cost
+
+
+# -- the whole study --------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def tuned():
+    one = servo(proportional=0.2, integral=8.0, breakaway=0.3)
+    task = Specification(
+        title="Servo",
+        case="",
+        demand=demand(peak_current=3.0, stiction_margin=1.3),
+        tuning=Tuning(gains=(POSITION, SPEED), dead_band=True),
+        corners={"friction": {"as it is": Change(), "less": Change(factors={"gear.bearings.*.*": 0.5})}},
+    )
+    return tune(task, one, margins=(1.0, 1.6), workers=1)
+
+
+def test_a_servo_that_hunts_is_tuned_until_it_does_not(tuned):
+    assert all(check.hunts(1.0) for check in tuned.before_checks)
+    assert tuned.met
+    assert not any(check.hunts(1.0) or check.hunts(1.3) for check in tuned.rounds[-1].checks)
+    assert all(check.followed > 1 / math.sqrt(2) for check in tuned.rounds[-1].checks)
+    assert max(check.standing_error for check in tuned.rounds[-1].checks) < tuned.design.standing_error * 1.01
+    errors = [error for _, error in tuned.trade_off]
+    assert errors[0] < errors[1]
+
+
+def test_the_dead_band_is_what_ends_the_hunting(tuned):
+    corner = tuned.corners[0]
+    small = replace(tuned.specification.demand, amplitude=0.002)  # moves that end inside what stiction holds
+    (with_it,) = check_corners(tuned.plant, [corner], tuned.parameters, small, workers=1)
+    (without,) = check_corners(tuned.plant, [corner], {**tuned.parameters, DEAD_BAND: 0.0}, small, workers=1)
+    assert without.hunts(1.0)
+    assert not with_it.hunts(1.0)
+    assert shortfalls([without], small)["slip"] > 1
+
+
+def test_dead_band_at_the_motor(aileron):
+    ratio = abs(aileron.gear.ratio())
+    assert with_dead_band(aileron, {POSITION: 30.0}, 1e-3)[DEAD_BAND] == pytest.approx(ratio * 30.0 * 1e-3)
+    assert dead_banded(aileron).controller.speed.remedies == IntegralRemedies(dead_band=0.0)
+
+
+def test_twins_are_corners_that_linear_models_cannot_tell_apart(one):
+    modes = [corner_modes(without_dead_band(one), Corner(name, {}), 1.5, {}) for name in ("a", "b")]
+    gains = dict(zip(GAINS, (20.0, 0.8, 8.0), strict=True))
+    assert twins_of([m for each in modes for m in measures(each, gains, demand(), {})]) == {"a": ["a", "b"]}
+
+
+def test_report(tuned, tmp_path):
+    from studies.cases import Case
+    from studies.report import write_files
+    from studies.tuning_report import tuning_files
+
+    case = Case(name="servo", title="", description="", actuator=tuned.original, duration=1.0, inputs={})
+    found = tuning_files(tuned, case)
+    write_files(found.pictures, found.result, found.text, tmp_path, found.files)
+    pictures = {"loops.png", "step.png", "trade_off.png"}
+    tables = {"corners.csv", "measures.csv", "findings.txt", "result.json", "report.html"}
+    assert {path.name for path in tmp_path.iterdir()} == pictures | tables
+    result = json.loads((tmp_path / "result.json").read_text())
+    assert result["met"]
+    assert result["gains"]["tuned"][DEAD_BAND] > 0
+    html = (tmp_path / "report.html").read_text()
+    assert "All demands met" in html
+    assert html.count("data:image/png;base64") == 3
+
+
+# -- wrong input ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("plant", "says"),
+    [
+        (
+            lambda: replace(
+                servo(), motor=TorqueSource(), controller=PID(proportional=1.0, integral=1.0, derivative=1.0)
+            ),
+            "takes a Cascade",
+        ),
+        (lambda: replace(servo(), sampling=Sampling(speed=1e-3, position=1e-3)), "continuous time"),
+    ],
+)
+def test_what_cannot_be_tuned(plant, says):
+    with pytest.raises(NotTunable, match=says):
+        tune(specification(), plant(), workers=1)
+
+
+def test_without_a_dead_band_stiction_and_integral_hunt(one):
+    task = replace(specification(), tuning=Tuning(gains=GAINS))
+    with pytest.raises(NotTunable, match="allow tuning.dead_band"):
+        tune(task, one, workers=1)
+
+
+def test_built_in_specification():
+    task, case = load_specification("aileron")
+    corners = task.all_corners(case.actuator)
+    assert len(corners) == 12
+    assert corners[0].parameters == {"load.bias": 8.0} or corners[0].parameters == {}
+    last = corners[-1].parameters
+    assert last["load.bias"] == -8.0
+    assert last["gear.bearings.hinge.breakaway"] == pytest.approx(9 * 0.25)
+    assert last["gear.meshes.first.elasticity.gap"] == pytest.approx(30e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("title = 'x'", "is missing"),
+        ("[demand]\nbandwidth = -1", "bandwidth"),
+        ("[corners.a.b.factors]\n'gear.none.*' = 2", "no parameter fits 'gear.none"),
+    ],
+)
+def test_wrong_specifications_get_one_line(tmp_path, text, says):
+    path = tmp_path / "own.toml"
+    whole = (
+        "title = 't'\ncase = 'aileron'\n[tuning]\ngains = ['controller.position.gain']\n[demand]\nstroke = 1.0\n"
+        "stiffness = 1.0\npeak_current = 1.0\nstanding_error = 0.1\n"
+    )
+    body = whole + "bandwidth = 1.0\n" + text if text.startswith("[corners") else text
+    if text.startswith("[demand]"):
+        body = whole + "bandwidth = -1.0\n"
+    path.write_text(body)
+    with pytest.raises(CaseError, match=says):
+        load_specification(path)
+    ended = CliRunner().invoke(main, ["tuning", str(path)])
+    assert ended.exit_code == 2
+    assert len(ended.output.strip().splitlines()) == 1
+
+
+def test_unknown_specification_and_help():
+    ended = CliRunner().invoke(main, ["tuning", "nothing"])
+    assert ended.exit_code == 2
+    assert "the built-in ones are aileron" in ended.output
+    assert "--jobs" in CliRunner().invoke(main, ["tuning", "--help"]).output
+
+
+# -- what is kept -----------------------------------------------------------------------------------------
+
+
+def test_kept_results_survive_a_kill(tmp_path):
+    path = tmp_path / "kept.jsonl"
+    kept = Kept(path)
+    kept["a"], kept["b"] = {"x": 1.0}, {"x": 2.0}
+    with path.open("a") as file:
+        file.write('{"key": "c", "res')
+    again = Kept(path)
+    assert dict(again) == {"a": {"x": 1.0}, "b": {"x": 2.0}}
+    again["c"] = {"x": 3.0}
+    assert Kept(path)["c"] == {"x": 3.0}
+    with pytest.raises(TypeError, match="not taken back"):
+        del again["a"]
+    assert fingerprint({"b": 1, "a": 2.0}) == fingerprint({"a": 2.0, "b": 1}) != fingerprint({"a": 2.0, "b": 2})

@@ -7,6 +7,7 @@ import platform
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,7 +21,7 @@ from actuator.linear_plots import plot_modes
 from studies.frequency_mask import LimitCheck
 from studies.frequency_pictures import plot_beside, plot_family
 from studies.frequency_response import PARTS, Plan, Study, source
-from studies.frequency_tests import TESTS, png
+from studies.frequency_tests import TESTS
 from studies.report import LIBRARIES, _version
 
 SIDES = {
@@ -45,24 +46,32 @@ class StudyFiles(NamedTuple):
 
 def study_files(plan: Plan, studies: Sequence[Study], measured: Sequence[Spectrum] = ()) -> StudyFiles:
     """Pictures, numbers, sentences and tables of one study, or of several side by side."""
-    drawn = {study.case.name: _pictures(plan, study, measured) for study in studies}
-    beside = plot_beside(studies, _compared(plan)) if len(studies) > 1 else None
-    pictures = {
-        f"{label}_{name}" if len(studies) > 1 else name: figure
-        for label, figures in drawn.items()
-        for name, figure in figures.items()
-    } | ({"beside": beside} if beside else {})
-    bench = {
-        f"{study.case.name}_{_file(name)}.png" if len(studies) > 1 else f"{_file(name)}.png": test["picture"]
-        for study in studies
-        for name, test in study.tests.items()
-        if test["picture"]
-    }
+    several = len(studies) > 1
+
+    def named(label: str, name: str) -> str:
+        return f"{label}_{name}" if several else name
+
+    pictures: dict[str, Figure] = {}
+    images: dict[str, bytes] = {}
+    for study in studies:
+        label = study.case.name
+        pictures |= {named(label, name): figure for name, figure in _pictures(plan, study, measured).items()}
+        tests = {name: test["picture"] for name, test in study.tests.items() if test["picture"]}
+        images |= {f"{named(label, _file(name))}.png": base64.b64decode(image) for name, image in tests.items()}
+    if several:
+        pictures["beside"] = plot_beside(studies, _compared(plan))
     text = sentences(plan, studies)
     result = result_of(plan, studies)
-    html = _html(plan, studies, drawn, beside, measured, result, text)
+
+    def page(path: Path) -> None:
+        """The pictures are in its folder already."""
+        found = {each.stem: base64.b64encode(each.read_bytes()).decode() for each in path.parent.glob("*.png")}
+        prefixes = {study.case.name: named(study.case.name, "") for study in studies}
+        path.write_text(_html(plan, studies, measured, result, text, (found, prefixes)), encoding="utf-8")
+
     files: dict[str, Callable[[Path], None]] = {
-        "report.html": lambda path: path.write_text(html, encoding="utf-8"),
+        **{name: partial(_write_image, image) for name, image in images.items()},
+        "report.html": page,
         "responses.csv": lambda path: _write(path, _response_rows(plan, studies)),
         "stiffness.csv": lambda path: _write(path, _stiffness_rows(studies)),
         "margins.csv": lambda path: _write(path, _margin_rows(studies)),
@@ -72,10 +81,11 @@ def study_files(plan: Plan, studies: Sequence[Study], measured: Sequence[Spectru
         found = {s.case.name: s.stiffness[word].data for s in studies if word in s.stiffness}
         if found:
             files[f"stiffness_{word}.nc"] = lambda path, found=found: _to_netcdf(path, found)
-    files |= {
-        name: lambda path, image=image: path.write_bytes(base64.b64decode(image)) for name, image in bench.items()
-    }  # pyright: ignore[reportAssignmentType] - what they return is not used
     return StudyFiles(pictures, result, text, files)
+
+
+def _write_image(image: bytes, path: Path) -> None:
+    path.write_bytes(image)
 
 
 def _file(name: str) -> str:
@@ -287,7 +297,7 @@ def _margin_rows(studies: Sequence[Study]) -> Iterable[Sequence[Any]]:
 
 def _to_netcdf(path: Path, found: Mapping[str, xarray.Dataset]) -> None:
     """All cases in one file; complex numbers as two, and no words but the names of the axes."""
-    parts = []
+    parts: list[xarray.Dataset] = []
     for data in found.values():
         kept = data.drop_vars([name for name in data.variables if name in ("note", "unit")])
         for name, variable in list(kept.data_vars.items()):
@@ -299,7 +309,7 @@ def _to_netcdf(path: Path, found: Mapping[str, xarray.Dataset]) -> None:
             elif variable.dtype == bool:
                 kept[name] = variable.astype("int8")
         parts.append(kept)
-    joined = xarray.concat(
+    joined: xarray.Dataset = xarray.concat(
         parts, xarray.DataArray(list(found), dims="case", name="case"), combine_attrs="drop_conflicts"
     )
     joined.to_netcdf(path, engine="scipy")
@@ -311,17 +321,23 @@ def _to_netcdf(path: Path, found: Mapping[str, xarray.Dataset]) -> None:
 def _html(  # noqa: PLR0913, PLR0917 - all there is to show
     plan: Plan,
     studies: Sequence[Study],
-    drawn: Mapping[str, Mapping[str, Figure]],
-    beside: Figure | None,
     measured: Sequence[Spectrum],
     result: dict[str, Any],
     text: list[str],
+    pictures: tuple[Mapping[str, str], Mapping[str, str]],
 ) -> str:
+    """The page; `pictures` are all of them in base64 by name, and what the names begin with by case."""
+    found, prefixes = pictures
     environment = Environment(loader=PackageLoader("studies"), autoescape=True, undefined=StrictUndefined)
     point = ", ".join(f"{name} {value:.4g}" for name, value in {"reference": 0.0, **studies[0].inputs}.items())
+    shown = []
+    for study in studies:
+        prefix = prefixes[study.case.name]
+        own = {name.removeprefix(prefix): image for name, image in found.items() if name.startswith(prefix)}
+        shown.append(_shown(plan, study, own, measured))
     return environment.get_template("frequency_response.html").render(
-        shown=[_shown(plan, study, drawn[study.case.name], measured) for study in studies],
-        beside=png(beside) if beside else "",
+        shown=shown,
+        beside=found.get("beside", ""),
         mask=plan.mask,
         limits=[_limit(plan, k) for k in range(len(plan.mask.limits))],
         loops=list(dict.fromkeys(at for study in studies for at in study.linear.loops)),
@@ -335,10 +351,8 @@ def _html(  # noqa: PLR0913, PLR0917 - all there is to show
     )
 
 
-def _shown(plan: Plan, study: Study, drawn: Mapping[str, Figure], measured: Sequence[Spectrum]) -> dict[str, Any]:
+def _shown(plan: Plan, study: Study, pictures: Mapping[str, str], measured: Sequence[Spectrum]) -> dict[str, Any]:
     linear = study.linear
-    pictures = {name: png(figure) for name, figure in drawn.items()}
-    pictures |= {_file(name): test["picture"] for name, test in study.tests.items() if test["picture"]}
     return {
         "name": study.case.name,
         "title": study.case.title,
@@ -356,9 +370,7 @@ def _shown(plan: Plan, study: Study, drawn: Mapping[str, Figure], measured: Sequ
         "unreachable": linear.models.unreachable,
         "missing_loops": linear.missing,
         "missing": study.missing,
-        "margins": {
-            at: _margins_of(linear.margins[at]) for at in linear.margins
-        },
+        "margins": {at: _margins_of(linear.margins[at]) for at in linear.margins},
         "poles": {mode: _poles(found) for mode, found in linear.poles.items()},
     }
 

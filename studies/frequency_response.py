@@ -7,6 +7,7 @@ simulation; dynamic stiffness, powered and not; bench tests. Finished points are
 import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
+from functools import cache
 from importlib import metadata, resources
 from pathlib import Path
 from typing import Any
@@ -153,8 +154,9 @@ class Study:
         return {p.name: (float(p.default), p.unit) for p in self.case.actuator.system().parameters}
 
 
+@cache
 def source() -> str:
-    """A hash of the program text that computes and shows a study."""
+    """A hash of the program text that computes and shows a study, as it was when it was first asked for."""
     found = hashlib.sha256()
     for package in PACKAGES:
         folder = Path(str(resources.files(package)))

@@ -174,8 +174,8 @@ def robustness(  # noqa: PLR0913 - the study, and how it is run
     problem = {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
     shares = sample(problem, base, calc_second_order=False, scramble=True, seed=seed)
     rows = factors(shares, tolerances)
-    sets = [spread(nominal, tolerances, row.tolist()) for row in rows]
-    keys = [fingerprint([dict(nominal), values]) for values in sets]
+    sets = [{**nominal, **spread(nominal, tolerances, row.tolist())} for row in rows]
+    keys = [fingerprint(values) for values in sets]
     found = sweep(work, dict(zip(keys, sets, strict=True)), done=done, workers=workers, progress=progress)
     results = [found[key] for key in keys]
     block = len(names) + 2

@@ -31,6 +31,7 @@ STEPS = (0.1, 1.0)  # of the demanded amplitude
 SHOWN = 12  # parameters in the picture
 HUNTS, SLOW = "hunting", "missing the bandwidth"
 CYCLE, FOLLOWED = "cycle", "followed"
+WORDS = {CYCLE: "the amplitude of the cycle", FOLLOWED: "load over reference"}
 
 
 class Shot:
@@ -141,9 +142,9 @@ def robustness_study(  # noqa: PLR0913 - the study, and how it is run
     for measure, rows in found.influences.items():
         if rows[0].total > 0:
             listed = ", ".join(f"{row.parameter} {row.total:.2f}" for row in rows[:3])
-            text.append(f"what the {measure} depends on most (share of its variance): {listed}")
+            text.append(f"what {WORDS[measure]} depends on most (share of its variance): {listed}")
         else:
-            text.append(f"the {measure} does not vary")
+            text.append(f"{WORDS[measure]} does not vary")
     result = {
         "about": about,
         "title": specification.title,
@@ -183,8 +184,8 @@ def _influences(found: Robustness) -> Figure:
         axes.barh(at + 0.2, [row.total for row in shown], 0.4, xerr=[row.total_within for row in shown], label="total")
         axes.barh(at - 0.2, [row.alone for row in shown], 0.4, xerr=[row.alone_within for row in shown], label="alone")
         axes.set_yticks(at, [row.parameter for row in shown], fontsize="small")
-        axes.set_xlabel(f"share of the variance of the {measure}")
-        axes.set_xlim(min(0.0, axes.get_xlim()[0]), None)
+        axes.set_xlabel(f"share of the variance of {WORDS[measure]}")
+        axes.set_xlim(0, 1.25)
         axes.grid(alpha=0.3, axis="x")
         if not any(row.total for row in rows):
             axes.text(0.5, 0.5, "does not vary", ha="center", transform=axes.transAxes)

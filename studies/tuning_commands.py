@@ -14,7 +14,8 @@ from studies.report import write_files
 from studies.robustness import MissingLibrary
 from studies.robustness_study import robustness_study
 from studies.specification import built_in_specifications, load_specification
-from studies.tuning import NotTunable, tune
+from studies.tuning import tune
+from studies.tuning_design import NotTunable
 from studies.tuning_report import TuningFiles, tuning_files
 
 KEPT = "simulations.jsonl"

@@ -13,10 +13,11 @@ import pytest
 import xarray
 from click.testing import CliRunner
 
-from studies import frequency_response as module
+from actuator import SineStream
 from studies.__main__ import main
 from studies.files import CaseError
 from studies.frequency_mask import Limit, checked, load_mask, phase_of
+from studies.frequency_response import PARTS, WrongRequest, load_positioner
 
 INERTIA, GAIN, RATE, INTEGRAL = 1.0, 100.0, 8.0, 50.0
 FREQUENCIES = (0.5, 1.0, 2.0)  # Hz
@@ -59,10 +60,10 @@ phase_low_deg = [-150, -150]
 """
 
 
-def response(frequency):
+def response(frequency, inertia=INERTIA):
     """Load angle over reference of the mass; the derivative is that of the load alone."""
     s = 2j * math.pi * np.asarray(frequency)
-    return (GAIN + INTEGRAL / s) / (INERTIA * s**2 + RATE * s + GAIN + INTEGRAL / s)
+    return (GAIN + INTEGRAL / s) / (inertia * s**2 + RATE * s + GAIN + INTEGRAL / s)
 
 
 def invoke(*arguments):
@@ -93,8 +94,19 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def outcome(folder):
-    """Of the study, with its files in folder/out."""
-    return invoke(*options(folder), "--out", folder / "out")
+    """Of a study of two cases with a record laid over them, with its files in folder/out."""
+    time = np.arange(0, 30, 0.01)
+    reference = np.random.default_rng(0).standard_normal(len(time))
+    table = np.column_stack([time, reference, 0.5 * reference])
+    np.savetxt(folder / "rig.csv", table, delimiter=",", header="time,reference,response", comments="")
+    beside = ("--against", folder / "heavier.toml", "--measured", folder / "rig.csv")
+    return invoke(*options(folder), *beside, "--out", folder / "out")
+
+
+@pytest.fixture
+def without_pictures(monkeypatch):
+    """They take longer than all that is computed here."""
+    monkeypatch.setattr("studies.frequency_report._pictures", lambda *arguments: {})
 
 
 def test_the_sines_are_those_of_the_closed_form(folder, outcome):
@@ -105,13 +117,13 @@ def test_the_sines_are_those_of_the_closed_form(folder, outcome):
     np.testing.assert_allclose(data.frequency, FREQUENCIES)
     np.testing.assert_allclose(found[0], response(FREQUENCIES), rtol=1e-3)
     with (folder / "out" / "responses.csv").open(newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+        rows = [row for row in csv.DictReader(file) if row["case"] == "mass"]
     np.testing.assert_allclose([float(row["gain_db"]) for row in rows], 20 * np.log10(abs(found[0])), rtol=1e-9)
 
 
 def test_the_compliance_is_that_of_the_closed_form(folder, outcome):
     with (folder / "out" / "stiffness.csv").open(newline="", encoding="utf-8") as file:
-        rows = [row for row in csv.DictReader(file) if row["state"] == "powered"]
+        rows = [row for row in csv.DictReader(file) if row["state"] == "powered" and row["case"] == "mass"]
     s = 2j * math.pi * np.array([float(row["frequency_Hz"]) for row in rows])
     stiffness = abs(INERTIA * s**2 + GAIN + INTEGRAL / s + RATE * s)
     np.testing.assert_allclose([float(row["stiffness_Nm_per_rad"]) for row in rows], stiffness, rtol=1e-3)
@@ -129,16 +141,30 @@ def test_the_margins_are_those_of_the_closed_form(folder, outcome):
 def test_everything_is_written_and_the_page_needs_nothing_else(folder, outcome):
     names = {path.name for path in (folder / "out").iterdir() if path.suffix != ".jsonl"}
     assert {"report.html", "result.json", "findings.txt", "responses.csv", "stiffness.csv", "margins.csv"} <= names
-    assert {"responses.nc", "stiffness_powered.nc", "stiffness_unpowered.nc", "family.png", "test_step.png"} <= names
+    assert {
+        "responses.nc",
+        "stiffness_powered.nc",
+        "stiffness_unpowered.nc",
+        "mass_family.png",
+        "heavier_test_step.png",
+    } <= names
     page = (folder / "out" / "report.html").read_text(encoding="utf-8")
     result = json.loads((folder / "out" / "result.json").read_text())
     assert "src=" in page and page.count("src=") == page.count('src="data:image/png;base64,')
-    for words in (result["cases"]["mass"]["model"], result["source"], "For a test", "gear.shafts.mass.inertia", "kg m^2"):
+    for words in (
+        result["cases"]["mass"]["model"],
+        result["source"],
+        "For a test",
+        "gear.shafts.mass.inertia",
+        "kg m^2",
+    ):
         assert words in page
     assert not [name for name in names if name.startswith(".writing")]
 
 
-def test_a_mask_is_kept_or_missed_and_the_second_study_computes_nothing(folder, outcome, monkeypatch):
+def test_a_mask_is_kept_or_missed_and_the_second_study_computes_nothing(
+    folder, outcome, tmp_path, without_pictures, monkeypatch
+):
     peak = 20 * np.log10(abs(response(FREQUENCIES))).max()
     assert 0.5 < peak < 6  # dB: one mask is missed and the other kept
     assert "mass: the mask is kept." in outcome.output
@@ -148,57 +174,47 @@ def test_a_mask_is_kept_or_missed_and_the_second_study_computes_nothing(folder, 
 
     monkeypatch.setattr("actuator.sine_stream.SineStream.measure", never)
     monkeypatch.setattr("studies.frequency_tests.BenchWork.__call__", never)
-    again = invoke(*options(folder, "missed.toml"), "--out", folder / "out")
+    (kept,) = (folder / "out").glob("finished-*.jsonl")
+    (tmp_path / kept.name).write_text(kept.read_text())
+    again = invoke(*options(folder, "missed.toml"), "--out", tmp_path)
     assert again.exit_code == 0, again.output
     assert "mass: the mask is missed: gain, from above, at 0.4 deg" in again.output
-    rows = json.loads((folder / "out" / "result.json").read_text())["cases"]["mass"]["checks"]
+    rows = json.loads((tmp_path / "result.json").read_text())["cases"]["mass"]["checks"]
     slack = {row["side"]: row["slack"] for row in rows}
     assert slack["gain_high_db"] == pytest.approx(0.5 - peak, abs=0.01)
     assert slack["gain_low_db"] > 0 and not all(row["met"] for row in rows)
 
 
-def test_a_killed_study_goes_on_where_it_stopped(folder, outcome, tmp_path, monkeypatch):
+def test_a_killed_study_goes_on_where_it_stopped(folder, outcome, tmp_path, without_pictures, monkeypatch):
     (kept,) = (folder / "out").glob("finished-*.jsonl")
     lines = kept.read_text().splitlines(keepends=True)
     dropped = [line for line in lines if "at 2 Hz" in line]
-    assert dropped
+    mass, both = 1 + 2 * len(PARTS), 2 * (1 + 2 * len(PARTS))  # sines of 2 Hz: one of the reference, others of torque
+    assert len(dropped) == both
     left = "".join(line for line in lines if line not in dropped)
     (tmp_path / kept.name).write_text(left + '{"key": "half')  # what a kill in the middle of a write leaves
     computed = []
-    measure = module_measure()
+    measure = SineStream.measure
     monkeypatch.setattr(
         "actuator.sine_stream.SineStream.measure", lambda self, point: computed.append(point) or measure(self, point)
     )
     again = invoke(*options(folder), "--out", tmp_path)
     assert again.exit_code == 0, again.output
-    assert len(computed) == len(dropped) and {point.frequency for point in computed} == {2.0}
-    assert (tmp_path / "responses.csv").read_text() == (folder / "out" / "responses.csv").read_text()
+    assert len(computed) == mass and {point.frequency for point in computed} == {2.0}
+    rows, before = ((path / "responses.csv").read_text().splitlines() for path in (tmp_path, folder / "out"))
+    assert rows == [row for row in before if not row.startswith("heavier")]
 
 
-def module_measure():
-    """What measures a sine, before it is replaced."""
-    from actuator.sine_stream import SineStream
-
-    return SineStream.measure
-
-
-def test_a_second_case_and_a_record_are_laid_beside_it(folder, outcome, tmp_path):
-    (kept,) = (folder / "out").glob("finished-*.jsonl")
-    (tmp_path / kept.name).write_text(kept.read_text())
-    time = np.arange(0, 30, 0.01)
-    reference = np.random.default_rng(0).standard_normal(len(time))
-    table = np.column_stack([time, reference, 0.5 * reference])
-    np.savetxt(tmp_path / "rig.csv", table, delimiter=",", header="time,reference,response", comments="")
-    beside = invoke(
-        *options(folder), "--against", folder / "heavier.toml", "--measured", tmp_path / "rig.csv", "--out", tmp_path
-    )
-    assert beside.exit_code == 0, beside.output
-    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+def test_a_second_case_and_a_record_are_laid_beside_it(folder, outcome):
+    page = (folder / "out" / "report.html").read_text(encoding="utf-8")
     assert "A mass under a PID beside A heavier mass" in page and "Measured records" in page and "rig" in page
     assert "Shaded where they differ" in page and page.count('class="other"') == 1
-    data = xarray.open_dataset(tmp_path / "responses.nc", engine="scipy")
+    data = xarray.open_dataset(folder / "out" / "responses.nc", engine="scipy").isel(set=0, load=0, output=0)
     assert data.case.values.tolist() == ["mass", "heavier"]
-    assert (tmp_path / "beside.png").exists()
+    heavier = data.isel(case=1, amplitude=0)
+    found = heavier.response_real.values + 1j * heavier.response_imaginary.values
+    np.testing.assert_allclose(found, response(FREQUENCIES, inertia=2 * INERTIA), rtol=1e-3)
+    assert (folder / "out" / "beside.png").exists()
 
 
 # -- limits ---------------------------------------------------------------------------------------------------
@@ -250,7 +266,10 @@ def test_a_wrong_mask_is_refused(name, tmp_path):
 WRONG = {
     "an unknown case": (("ailerons",), "cannot be read"),
     "amplitudes that are no numbers": (("--amplitudes", "1;2"), "--amplitudes are numbers with commas"),
-    "an amplitude beyond the stroke": (("--amplitudes", "80"), "at most 50 % of the stroke, and at least one, got 80 %"),
+    "an amplitude beyond the stroke": (
+        ("--amplitudes", "80"),
+        "at most 50 % of the stroke, and at least one, got 80 %",
+    ),
     "frequencies that fall": (("--frequencies", 2, 1, 3), "--frequencies are FROM TO COUNT with 0 < FROM <= TO"),
     "no frequency within the mask": (("--frequencies", 100, 200, 2), "no frequency is within limit 1 of the mask"),
     "a mask that is not there": (("--mask", "nowhere.toml"), "cannot be read"),
@@ -280,8 +299,8 @@ def test_a_motor_without_limits_needs_a_torque(folder, tmp_path):
 def test_a_case_without_a_controller_has_no_response(folder, tmp_path):
     path = tmp_path / "open.toml"
     path.write_text(MASS[: MASS.index("[controller]")] + "[scenario]\nduration = 1\n")
-    with pytest.raises(module.WrongRequest, match="open: has no position controller"):
-        module.load_positioner(path)
+    with pytest.raises(WrongRequest, match="open: has no position controller"):
+        load_positioner(path)
 
 
 def test_help_tells_the_options():

@@ -6,6 +6,7 @@ that hunts if and only if its breakaway friction exceeds its sliding friction.
 
 import math
 import sys
+from dataclasses import replace
 from statistics import NormalDist
 
 import numpy as np
@@ -83,33 +84,60 @@ def test_indices_of_a_sum_in_closed_form():
     assert large.low < 0.5 < large.high
 
 
+def test_what_does_not_spread_has_its_nominal_value():
+    nominal = {"a": 1.0, "b": 1.0, "c": 100.0}
+    found = robustness(summed, nominal, spreads(a=0.1, b=0.1), events={}, measures=(), base=4, workers=1)
+    assert all(result["sum"] > 100 for result in found.results)
+
+
+GUIDE = MassOnGuide(dead=0.05, breakaway=1.3)
+ACTUATOR = GUIDE.actuator()
+BREAKAWAY = "gear.bearings.guide.breakaway"
+
+
+def cycles(breakaway):
+    """Whether there is a cycle, in closed form."""
+    try:
+        replace(GUIDE, breakaway=breakaway).cycle(low=GUIDE.dead * 1.0001)
+    except ValueError:
+        return False
+    return True
+
+
 def guided(parameters):
-    run = simulate(MassOnGuide().actuator(), 30.0, inputs={"reference": 0.3}, parameters=parameters, resolution=0.01)
+    run = simulate(ACTUATOR, 60.0, inputs={"reference": 0.3}, parameters=parameters, resolution=0.02)
     verdict = classify(run)
-    return {"verdict": verdict.verdict, "cycle": verdict.amplitude_rad if verdict.cycles else 0.0}
+    return {"verdict": verdict.verdict, "size": float(np.ptp(run["load_angle"][-1000:]))}
 
 
-def test_a_mass_on_a_guide_hunts_with_the_probability_of_stiction(tmp_path):
-    # breakaway = max(1.05 u, coulomb), u uniform in 0.7 to 1.3: it exceeds coulomb = 1 with probability 0.58
-    nominal = {q.name: float(q.default) for q in MassOnGuide(breakaway=1.05).actuator().system().parameters}
+def test_a_mass_on_a_guide_hunts_with_a_known_probability(tmp_path):
+    # it hunts where a cycle exists, above a breakaway friction that is 1.3 N m
+    low, high = 1.2, 1.4
+    for _ in range(8):
+        middle = (low + high) / 2
+        low, high = (low, middle) if cycles(middle) else (middle, high)
+    boundary = (low + high) / 2 / GUIDE.breakaway
+    nominal = {q.name: float(q.default) for q in ACTUATOR.system().parameters}
     options = {
         "events": {"hunting": lambda result: result["verdict"] != "rest"},
-        "measures": ("cycle",),
+        "measures": ("size",),
         "base": 8,
         "seed": 3,
         "workers": 1,
     }
     path = tmp_path / "kept.jsonl"
-    found = robustness(guided, nominal, spreads(**{"gear.bearings.guide.breakaway": 0.3}), done=Kept(path), **options)
+    found = robustness(guided, nominal, spreads(**{BREAKAWAY: 0.2}), done=Kept(path), **options)
     hunting = found.probabilities["hunting"]
-    assert hunting.low < (1.3 - 1 / 1.05) / 0.6 < hunting.high
+    assert hunting.trials == 16
+    assert hunting.low < (1.2 - boundary) / 0.4 < hunting.high
     for point, result in zip(found.points, found.results, strict=True):
-        assert (result["verdict"] != "rest") == (1.05 * point["gear.bearings.guide.breakaway"] > 1.0)
+        if abs(point[BREAKAWAY] - boundary) > 0.01:
+            assert (result["verdict"] != "rest") == (point[BREAKAWAY] > boundary)
 
     def never(parameters):
         raise AssertionError("what is kept is not run again")
 
-    again = robustness(never, nominal, spreads(**{"gear.bearings.guide.breakaway": 0.3}), done=Kept(path), **options)
+    again = robustness(never, nominal, spreads(**{BREAKAWAY: 0.2}), done=Kept(path), **options)
     assert again.probabilities == found.probabilities
 
 

@@ -23,14 +23,8 @@ from studies.kept import Kept, fingerprint
 from studies.specification import Change, Corner, Demand, Specification, Tuning, load_specification
 from studies.tuning import (
     DEAD_BAND,
-    INTEGRAL,
-    POSITION,
-    SPEED,
-    Active,
-    NotTunable,
     closed_form,
     dead_banded,
-    design,
     inertia_at_motor,
     shortfalls,
     tune,
@@ -39,6 +33,7 @@ from studies.tuning import (
     without_dead_band,
 )
 from studies.tuning_check import check_corners
+from studies.tuning_design import INTEGRAL, POSITION, SPEED, Active, NotTunable, design
 from studies.tuning_measures import LOOPS, corner_modes, measures, worst
 
 GAINS = (POSITION, SPEED, INTEGRAL)
@@ -215,7 +210,7 @@ def specification(**changed):
 
 def test_the_optimum_lies_where_delay_and_phase_let_it(one):
     # without an integral D = H/(Kp g): the speed loop Kp/(J s) (1 + g/s) is as fast as the delay margin allows
-    task = specification(peak_current=1e4)
+    task = specification(peak_current=1e4, delay_margin=3e-3)
     start = {POSITION: 10.0, SPEED: 0.3}
     modes = corner_modes(without_dead_band(one), Corner("only", {INTEGRAL: 1e-12}), 1.5, start)
     found = design([modes], start, task)
@@ -265,7 +260,7 @@ def tuned():
         title="Servo",
         case="",
         demand=demand(peak_current=3.0, stiction_margin=1.3),
-        tuning=Tuning(gains=(POSITION, SPEED), dead_band=True),
+        tuning=Tuning(gains=(POSITION, SPEED), dead_band=True, range=5.0),
         corners={"friction": {"as it is": Change(), "less": Change(factors={"gear.bearings.*.*": 0.5})}},
     )
     return tune(task, one, margins=(1.0, 1.6), workers=1)

@@ -8,21 +8,21 @@ from typing import Any
 import casadi as ca
 
 from actuator.contacts import ContactMechanics
-from actuator.current_source import CurrentSource
-from actuator.dc_link import DCLink
 from actuator.drive import ANGLE, Motion, Site, cascade_drive, loops_of, open_drive, pid_drive
 from actuator.fitting import require_fitting
 from actuator.heat import Heat
 from actuator.hybrid import Clock, HybridSystem
-from actuator.inverter import Inverter
 from actuator.ledger import Ledger
-from actuator.linear_load import LinearLoad
-from actuator.load import Load
-from actuator.motor import PMSM, DCMotor, TorqueSource
 from actuator.observe import Mechanics, observe
 from actuator.parameters import Parameter, parameterize, with_values
-from actuator.sensors import Sensors
-from actuator.thermal import ThermalNetwork
+from actuator.parts.current_source import CurrentSource
+from actuator.parts.dc_link import DCLink
+from actuator.parts.inverter import Inverter
+from actuator.parts.linear_load import LinearLoad
+from actuator.parts.load import Load
+from actuator.parts.motor import PMSM, DCMotor, TorqueSource
+from actuator.parts.sensors import Sensors
+from actuator.parts.thermal import ThermalNetwork
 from controllers.cascade import Cascade
 from controllers.pid import PID
 from controllers.sampling import LOOPS, Sampling

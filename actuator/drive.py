@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 
 from actuator.ledger import Ledger, Loop
-from actuator.temperature import MotorTemperature
+from actuator.parts.temperature import MotorTemperature
 from actuator.winding import PlantVoltages, winding
 from controllers.cascade import Cascade, Remedies
 from controllers.pid import PI, PID

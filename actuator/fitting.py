@@ -2,8 +2,8 @@
 
 from typing import TYPE_CHECKING
 
-from actuator.current_source import CurrentSource
-from actuator.motor import PMSM, DCMotor
+from actuator.parts.current_source import CurrentSource
+from actuator.parts.motor import PMSM, DCMotor
 from controllers.cascade import Cascade
 from controllers.pid import PID
 from controllers.sampling import LOOPS

@@ -7,8 +7,8 @@ import casadi as ca
 
 from actuator.ledger import Ledger
 from actuator.parameters import substituted, unchecked
-from actuator.temperature import MotorTemperature
-from actuator.thermal import ThermalNetwork
+from actuator.parts.temperature import MotorTemperature
+from actuator.parts.thermal import ThermalNetwork
 from gear.lubricant import MEASURED, OilAt
 from gear.quantities import Scalar
 

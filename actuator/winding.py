@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 
-from actuator.current_source import CurrentSource
-from actuator.dc_motor import DCMotor
 from actuator.ledger import PREFIX, Ledger, Loop
 from actuator.parameters import unchecked
-from actuator.park import rotated
-from actuator.pmsm import PMSM
-from actuator.torque_source import TorqueSource
+from actuator.parts.current_source import CurrentSource
+from actuator.parts.dc_motor import DCMotor
+from actuator.parts.park import rotated
+from actuator.parts.pmsm import PMSM
+from actuator.parts.torque_source import TorqueSource
 from controllers.current_reference import CurrentReference
 from controllers.pid import PI
 from controllers.shapes import limited

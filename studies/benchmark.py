@@ -8,8 +8,8 @@ import casadi as ca
 import numpy as np
 
 from actuator import Actuator, Run, simulate
-from actuator.compiled import compile_function, compiler
-from actuator.signals import Signal
+from actuator.simulation.compiled import compile_function, compiler
+from actuator.simulation.signals import Signal
 from studies.cases import built_in, load_case
 from studies.paper import (
     compound_planetary,

@@ -8,16 +8,16 @@ from typing import Annotated, Any
 from annotated_types import Gt, Unit
 
 from actuator.actuator import Actuator
-from actuator.current_source import CurrentSource
-from actuator.dc_link import DCLink
-from actuator.inverter import Inverter
-from actuator.linear_load import LinearLoad
-from actuator.load import Load
-from actuator.motor import PMSM, DCMotor, TorqueSource
 from actuator.parameters import require_known
-from actuator.sensors import Sensors
-from actuator.signals import Signal
-from actuator.thermal import ThermalNetwork
+from actuator.parts.current_source import CurrentSource
+from actuator.parts.dc_link import DCLink
+from actuator.parts.inverter import Inverter
+from actuator.parts.linear_load import LinearLoad
+from actuator.parts.load import Load
+from actuator.parts.motor import PMSM, DCMotor, TorqueSource
+from actuator.parts.sensors import Sensors
+from actuator.parts.thermal import ThermalNetwork
+from actuator.simulation.signals import Signal
 from controllers.cascade import Cascade
 from controllers.pid import PID
 from controllers.sampling import Sampling

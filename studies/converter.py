@@ -11,7 +11,7 @@ from cattrs.cols import is_mapping, mapping_structure_factory
 from cattrs.gen import make_dict_structure_fn
 
 from actuator.parameters import require_known
-from actuator.signals import Chirp, Constant, Gust, Ramp, Signal, Sine, Staircase, Step, Sum, Table
+from actuator.simulation.signals import Chirp, Constant, Gust, Ramp, Signal, Sine, Staircase, Step, Sum, Table
 from studies.units import field_unit, is_number, spellings, split, to_si
 
 Hook = Callable[[Any, Any], Any]

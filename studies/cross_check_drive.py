@@ -21,7 +21,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from actuator import PMSM, Actuator, Inverter, Run, Step, simulate
-from actuator.park import to_axes
+from actuator.parts.park import to_axes
 from controllers import PI, Cascade, LowPass, PositionObserver, Sampling
 from gear import Shaft, Transmission
 from studies.cross_check_record import (

@@ -17,7 +17,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from actuator import LiftedMargins, Margins, Poles, Spectrum
-from actuator.linear_plots import plot_modes
+from actuator.linear.plots import plot_modes
 from studies.frequency_mask import LimitCheck
 from studies.frequency_pictures import plot_beside, plot_family
 from studies.frequency_response import PARTS, Plan, Study, source

@@ -21,8 +21,8 @@ from actuator import (
     torque_speed_curve,
     unpowered,
 )
-from actuator.signals import piece_at
-from actuator.sweep import sweep
+from actuator.response.sweep import sweep
+from actuator.simulation.signals import piece_at
 from studies.cases import Case, load_case
 from studies.frequency_linear import OUTPUT, LinearPart, linear_part
 from studies.frequency_mask import LimitCheck, Mask, checked

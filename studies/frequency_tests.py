@@ -27,7 +27,7 @@ from actuator import (
     triangle_test,
     unpowered,
 )
-from actuator.bench import Numbers
+from actuator.response.bench import Numbers
 from studies.report import DPI
 
 SMALLEST = 1e-5  # of the stroke, from which the threshold is sought

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from matplotlib.figure import Figure
 
-from actuator.causes import INTEGRALS
+from actuator.hunting.causes import INTEGRALS
 from studies.hunting_ends import CYCLES, EndPoint, along, crossings, ends, with_boundary
 from studies.hunting_map import FAILED, LABELS, Axis, Plan, compute, dataset, load
 from studies.hunting_pictures import plot_map

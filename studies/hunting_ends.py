@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from actuator import NoOrbit, SimulationError, find_orbit
-from actuator.continuation import BOUND, follow
-from actuator.hunting import IRREGULAR, REST
+from actuator.hunting.continuation import BOUND, follow
+from actuator.hunting.verdict import IRREGULAR, REST
 from studies.hunting_map import Plan, load, seen_at, side_by_side
 from studies.hunting_settings import meaning
 from studies.hunting_store import Index

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from actuator import SimulationError
-from actuator.decide import decide
-from actuator.hunting import REST, VERDICTS, Hunting
-from actuator.run import Run
+from actuator.hunting.decide import decide
+from actuator.hunting.verdict import REST, VERDICTS, Hunting
+from actuator.simulation.run import Run
 from studies.cases import Case, load_case
 from studies.hunting_settings import Setting, meaning, parameters_of
 from studies.hunting_store import Index, PointStore

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from actuator.hunting import DIVERGING
-from actuator.hunting_plots import VERDICT_COLORS
+from actuator.hunting.plots import VERDICT_COLORS
+from actuator.hunting.verdict import DIVERGING
 from studies.hunting_map import FAILED, LABELS
 
 if TYPE_CHECKING:

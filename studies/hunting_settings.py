@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 from typing import NamedTuple
 
-from actuator.hunting_margins import FLOORS
+from actuator.hunting.margins import FLOORS
 from actuator.hybrid import HybridSystem
 from actuator.parameters import require_known
 

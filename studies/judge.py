@@ -24,13 +24,13 @@ from actuator import (
     trim,
     without_counts,
 )
-from actuator.causes import Causes, find_causes
-from actuator.hunting import DIVERGING
-from actuator.hunting_margins import ENDINGS, HuntingMargin, hunting_margin
+from actuator.hunting.causes import Causes, find_causes
+from actuator.hunting.margins import ENDINGS, HuntingMargin, hunting_margin
+from actuator.hunting.remedies import RemedySearch, RemedyTable
+from actuator.hunting.sampled_orbit import SampledOrbit, find_sampled_orbit
+from actuator.hunting.verdict import DIVERGING
 from actuator.ledger import PREFIX
-from actuator.remedies import RemedySearch, RemedyTable
-from actuator.sampled_orbit import SampledOrbit, find_sampled_orbit
-from actuator.signals import piece_at
+from actuator.simulation.signals import piece_at
 from studies.cases import Case
 from studies.processes import processes
 

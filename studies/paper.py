@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import Literal
 
 from actuator import Actuator, Constant, Load, Ramp, Sine, TorqueSource
-from actuator.signals import Signal
+from actuator.simulation.signals import Signal
 from gear import Bearing, Coulomb, ExternalPair, GivenPair, InternalPair, Linear, Mesh, Shaft, Transmission
 from gear.arrangements import MeshLaws, Planets, stepped_planetary
 

@@ -17,9 +17,10 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from actuator import Orbit
-from actuator.plots import plot_bode, plot_run
-from actuator.remedies import Remedy, cells
-from actuator.sampled_orbit import SampledOrbit
+from actuator.hunting.remedies import Remedy, cells
+from actuator.hunting.sampled_orbit import SampledOrbit
+from actuator.linear.plots import plot_bode
+from actuator.simulation.plots import plot_run
 from studies.judge import Insight, Judgment
 
 LIBRARIES = ("geared-actuator", "casadi", "control", "numpy", "scipy", "matplotlib")

@@ -163,7 +163,7 @@ def robustness(  # noqa: PLR0913 - the study, and how it is run
     ValueError
         Without tolerances, or with a base that is no power of two.
     """
-    from actuator.sweep import sweep
+    from actuator.response.sweep import sweep
 
     if not tolerances:
         raise ValueError("robustness needs at least one tolerance: add [[tolerances]] to the specification")

@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from actuator.actuator import Actuator
-from actuator.decide import decide
-from actuator.engine import SimulationError
-from actuator.hunting import REST
-from actuator.signals import Step
-from actuator.sine_stream import SinePoint, SineStream
-from actuator.sweep import sweep
+from actuator.hunting.decide import decide
+from actuator.hunting.verdict import REST
+from actuator.response.sine_stream import SinePoint, SineStream
+from actuator.response.sweep import sweep
+from actuator.simulation.engine import SimulationError
+from actuator.simulation.signals import Step
 from studies.kept import fingerprint
 from studies.specification import Corner, Demand
 

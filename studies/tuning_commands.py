@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
-from actuator.engine import SimulationError
-from actuator.trim import NoEquilibrium
+from actuator.linear.trim import NoEquilibrium
+from actuator.simulation.engine import SimulationError
 from studies.files import CaseError
 from studies.kept import Kept
 from studies.report import write_files

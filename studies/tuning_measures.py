@@ -30,10 +30,10 @@ from typing import NamedTuple
 import numpy as np
 
 from actuator.actuator import Actuator
-from actuator.gain_models import GainModel, Response, gain_model
-from actuator.linear_modes import mode_models
+from actuator.linear.gain_models import GainModel, Response, gain_model
+from actuator.linear.modes import mode_models
+from actuator.linear.trim import NoEquilibrium, OperatingPoint, rates_function, rounding, trim
 from actuator.parameters import Parameter
-from actuator.trim import NoEquilibrium, OperatingPoint, rates_function, rounding, trim
 from studies.specification import Corner, Demand
 
 LOOPS = ("speed_reference", "torque_reference")

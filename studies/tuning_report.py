@@ -15,9 +15,9 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
-from actuator.gain_models import gain_model
-from actuator.signals import Step
-from actuator.simulate import simulate
+from actuator.linear.gain_models import gain_model
+from actuator.simulation.signals import Step
+from actuator.simulation.simulate import simulate
 from studies.cases import Case
 from studies.kept import model_of
 from studies.report import DPI, LIBRARIES, _version

@@ -27,10 +27,10 @@ from actuator import (
     TorqueSource,
     simulate,
 )
-from actuator.compiled import compiler
-from actuator.engine import EngineOptions, engine
 from actuator.hybrid import Quantity
 from actuator.parameters import Parameter
+from actuator.simulation.compiled import compiler
+from actuator.simulation.engine import EngineOptions, engine
 from controllers import PID
 from gear import Bearing, Shaft, Transmission
 
@@ -161,7 +161,7 @@ def test_a_margin_that_a_reset_leaves_negative_is_found_and_settled():
 @pytest.fixture
 def few_events(monkeypatch):
     """Windows that hold a hundred events, so that failing takes no time."""
-    monkeypatch.setattr("actuator.window.MAX_EVENTS", 100)
+    monkeypatch.setattr("actuator.simulation.window.MAX_EVENTS", 100)
 
 
 @pytest.mark.parametrize("compiled", [False, pytest.param(True, marks=needs_compiler)])
@@ -238,7 +238,7 @@ def test_two_signals_of_one_name_are_refused():
 
 
 def test_compiling_without_a_compiler_is_refused_only_where_it_is_asked_for(monkeypatch):
-    monkeypatch.setattr("actuator.compiled.compiler", lambda: None)
+    monkeypatch.setattr("actuator.simulation.compiled.compiler", lambda: None)
     with pytest.raises(RuntimeError, match="needs a C compiler"):
         simulate(integrator(), 1.0, compiled=True)
     assert not simulate(integrator(), 1.0, compiled=None).statistics.compiled

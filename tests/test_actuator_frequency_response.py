@@ -31,9 +31,9 @@ from actuator import (
     temperature_sets,
     trim,
 )
-from actuator.fourier import fourier
-from actuator.sine_stream import SinePoint
-from actuator.sweep import sweep
+from actuator.response.fourier import fourier
+from actuator.response.sine_stream import SinePoint
+from actuator.response.sweep import sweep
 from controllers import PID, Sampling
 from gear import Bearing, KnownOil, OilAt, Shaft, Thickening, Transmission
 

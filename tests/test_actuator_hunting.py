@@ -26,11 +26,11 @@ from actuator import (
     simulate,
     trim,
 )
-from actuator.hunting_signals import turning_points
-from actuator.hunting_trace import stuck_fraction
+from actuator.hunting.trace import stuck_fraction
+from actuator.hunting.turns import turning_points
 from actuator.hybrid import Quantity
-from actuator.run import Statistics
-from actuator.sensors import AngleSensor, Sensors
+from actuator.parts.sensors import AngleSensor, Sensors
+from actuator.simulation.run import Statistics
 from controllers import PID, Sampling
 from gear import Backlash, Bearing, Coulomb, Coupling, ExternalPair, Linear, Mesh, Shaft, Transmission
 

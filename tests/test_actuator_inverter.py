@@ -11,16 +11,16 @@ from hypothesis import strategies as st
 from oracles import gradient_in_symbols, in_symbols, numbers
 from scipy.integrate import solve_ivp
 
-from actuator.bridge import Bridge
-from actuator.dc_link import BrakingChopper, DCLink
-from actuator.fold_back import OverheatFoldBack, UndervoltageFoldBack
-from actuator.inverter import Inverter
 from actuator.parameters import parameterize
-from actuator.park import to_axes, to_phases
-from actuator.pmsm import PMSM
-from actuator.pwm import bridge_duties, carrier, duties, leg_voltages, pulse
-from actuator.rotor import Rotor, RotorDrag
-from actuator.saturation import Saturation
+from actuator.parts.bridge import Bridge
+from actuator.parts.dc_link import BrakingChopper, DCLink
+from actuator.parts.fold_back import OverheatFoldBack, UndervoltageFoldBack
+from actuator.parts.inverter import Inverter
+from actuator.parts.park import to_axes, to_phases
+from actuator.parts.pmsm import PMSM
+from actuator.parts.pwm import bridge_duties, carrier, duties, leg_voltages, pulse
+from actuator.parts.rotor import Rotor, RotorDrag
+from actuator.parts.saturation import Saturation
 
 LINK = 300.0
 CIRCLE = Inverter(dc_voltage=LINK, current_limit=20.0)

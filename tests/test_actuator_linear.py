@@ -34,7 +34,7 @@ from actuator import (
     trim,
     without_counts,
 )
-from actuator.sensors import Sensors
+from actuator.parts.sensors import Sensors
 from controllers import PID, Sampling
 from gear import Bearing, Coupling, Shaft, Transmission
 from studies import load_case

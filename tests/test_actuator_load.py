@@ -30,7 +30,7 @@ from actuator import (
 from actuator.contacts import ContactMechanics
 from actuator.hybrid import Quantity
 from actuator.parameters import parameterize
-from actuator.signals import Ramp, Sine, Step, Sum, bounds, break_points, piece_at
+from actuator.simulation.signals import Ramp, Sine, Step, Sum, bounds, break_points, piece_at
 from gear import Bearing, Coulomb, EndStop, Linear, Mesh, ScrewPair, Shaft, Transmission
 from studies import load_case
 

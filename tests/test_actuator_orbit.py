@@ -12,8 +12,8 @@ import pytest
 from mass_on_guide import MassOnGuide
 
 from actuator import NoOrbit, find_orbit, follow, simulate
-from actuator.flow_map import flow_map
-from actuator.sampled_orbit import SampledOrbit
+from actuator.hunting.flow_map import flow_map
+from actuator.hunting.sampled_orbit import SampledOrbit
 from controllers import Sampling
 
 GUIDE = "gear.bearings.guide"

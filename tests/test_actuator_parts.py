@@ -9,11 +9,11 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from oracles import PAPER_PAIR, in_symbols, numbers
 
-from actuator.inverter import Inverter
-from actuator.load import Load
-from actuator.motor import PMSM, DCMotor, TorqueSource
 from actuator.parameters import parameterize, require_known
-from actuator.signals import (
+from actuator.parts.inverter import Inverter
+from actuator.parts.load import Load
+from actuator.parts.motor import PMSM, DCMotor, TorqueSource
+from actuator.simulation.signals import (
     Chirp,
     Constant,
     Piece,

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from actuator.parameters import parameterize
-from actuator.thermal import ThermalNetwork, ThermalNode, ThermalPath
+from actuator.parts.thermal import ThermalNetwork, ThermalNode, ThermalPath
 
 AMBIENT = 263.15
 NETWORK = ThermalNetwork(

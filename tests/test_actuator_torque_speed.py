@@ -9,12 +9,12 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize
 
-from actuator.inverter import Inverter
-from actuator.motor import PMSM, DCMotor
-from actuator.rotor import Rotor, RotorDrag
-from actuator.saturation import Saturation
-from actuator.temperature import MotorTemperature, TemperatureDependence
-from actuator.torque_speed import torque_speed_curve
+from actuator.parts.inverter import Inverter
+from actuator.parts.motor import PMSM, DCMotor
+from actuator.parts.rotor import Rotor, RotorDrag
+from actuator.parts.saturation import Saturation
+from actuator.parts.temperature import MotorTemperature, TemperatureDependence
+from actuator.parts.torque_speed import torque_speed_curve
 
 BRUSHED = DCMotor(resistance=0.299, inductance=8.2e-5, torque_constant=0.0302, inertia=1.42e-5)
 SUPPLY = Inverter(dc_voltage=24.0, current_limit=30.0)

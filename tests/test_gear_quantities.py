@@ -18,21 +18,21 @@ from gear import Backlash, Bearing, Coulomb, Coupling, ExternalPair, Linear, Sha
 from gear.quantities import Length, annotations, check, check_count, show, unit_of
 
 PARTS_OF_AN_ACTUATOR = (
-    "actuator.bridge",
-    "actuator.current_source",
-    "actuator.dc_link",
-    "actuator.dc_motor",
-    "actuator.fold_back",
-    "actuator.inverter",
-    "actuator.load",
-    "actuator.noise",
-    "actuator.pmsm",
-    "actuator.rotor",
-    "actuator.saturation",
-    "actuator.sensors",
-    "actuator.temperature",
-    "actuator.thermal",
-    "actuator.torque_source",
+    "actuator.parts.bridge",
+    "actuator.parts.current_source",
+    "actuator.parts.dc_link",
+    "actuator.parts.dc_motor",
+    "actuator.parts.fold_back",
+    "actuator.parts.inverter",
+    "actuator.parts.load",
+    "actuator.parts.noise",
+    "actuator.parts.pmsm",
+    "actuator.parts.rotor",
+    "actuator.parts.saturation",
+    "actuator.parts.sensors",
+    "actuator.parts.temperature",
+    "actuator.parts.thermal",
+    "actuator.parts.torque_source",
 )
 
 

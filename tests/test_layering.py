@@ -34,6 +34,20 @@ def test_imports_go_in_one_direction(file):
     assert ours <= MAY_IMPORT[file.parts[0]]
 
 
+# rooms of the actuator, each may enter itself and those before it; what stands beside them puts an actuator together
+ROOMS = ("parts", "simulation", "linear", "hunting", "response")
+
+
+@pytest.mark.parametrize("file", [file for file in FILES if file.parts[0] == "actuator"], ids=str)
+def test_rooms_of_the_actuator_are_entered_in_one_direction(file):
+    if file.name == "__init__.py":
+        return
+    own = ROOMS.index(file.parts[1]) if file.parts[1] in ROOMS else 0
+    modules = {node.module or "" for node in ast.walk(parsed(file)) if isinstance(node, ast.ImportFrom)}
+    entered = {name.split(".")[1] for name in modules if name.startswith("actuator.")} & set(ROOMS)
+    assert entered <= set(ROOMS[: own + 1])
+
+
 @pytest.mark.parametrize("file", FILES, ids=str)
 def test_every_public_name_has_a_docstring(file):
     tree = parsed(file)
@@ -51,5 +65,5 @@ def test_every_package_was_looked_at():
 
 
 def test_an_import_inside_a_function_is_seen():
-    tree = ast.parse("def late():\n    from actuator.run import Run\n    import studies.report as report\n")
+    tree = ast.parse("def late():\n    from actuator.simulation.run import Run\n    import studies.report as report\n")
     assert set(imported_packages(tree)) == {"actuator", "studies"}

@@ -299,7 +299,10 @@ def test_an_unknown_option_and_an_unknown_command_are_refused():
 
 def test_a_run_that_cannot_be_completed_is_told_in_one_line_and_nothing_is_written(case_file, tmp_path):
     # pushed away from the middle by its load, the mass is beyond all numbers after 230 s
-    text = MASS[: MASS.index("[controller]")] + "[load]\ntype = 'Load'\nstiffness = -10\nbias = 2\n[scenario]\nduration = 300\n"
+    text = (
+        MASS[: MASS.index("[controller]")]
+        + "[load]\ntype = 'Load'\nstiffness = -10\nbias = 2\n[scenario]\nduration = 300\n"
+    )
     outcome = invoke(case_file(text), "--out", tmp_path / "out")
     assert outcome.exit_code != 0
     assert isinstance(outcome.exception, SystemExit), repr(outcome.exception)

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from actuator.actuator import Actuator
-from actuator.inverter import Inverter
-from actuator.load import Load
-from actuator.motor import PMSM
-from actuator.signals import Chirp, Constant, Ramp, Sine, Step, Sum, Table
+from actuator.parts.inverter import Inverter
+from actuator.parts.load import Load
+from actuator.parts.motor import PMSM
+from actuator.simulation.signals import Chirp, Constant, Ramp, Sine, Step, Sum, Table
 from controllers import PID, Cascade, P
 from gear import Backlash, Bearing, Coulomb, ExternalPair, Linear, Mesh, Shaft, Transmission
 from gear.quantities import unit_of

@@ -172,7 +172,7 @@ def test_a_mask_is_kept_or_missed_and_the_second_study_computes_nothing(
     def never(*arguments, **others):
         raise AssertionError("a finished point was computed again")
 
-    monkeypatch.setattr("actuator.sine_stream.SineStream.measure", never)
+    monkeypatch.setattr("actuator.response.sine_stream.SineStream.measure", never)
     monkeypatch.setattr("studies.frequency_tests.BenchWork.__call__", never)
     (kept,) = (folder / "out").glob("finished-*.jsonl")
     (tmp_path / kept.name).write_text(kept.read_text())
@@ -196,7 +196,8 @@ def test_a_killed_study_goes_on_where_it_stopped(folder, outcome, tmp_path, with
     computed = []
     measure = SineStream.measure
     monkeypatch.setattr(
-        "actuator.sine_stream.SineStream.measure", lambda self, point: computed.append(point) or measure(self, point)
+        "actuator.response.sine_stream.SineStream.measure",
+        lambda self, point: computed.append(point) or measure(self, point),
     )
     again = invoke(*options(folder), "--out", tmp_path)
     assert again.exit_code == 0, again.output

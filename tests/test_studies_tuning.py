@@ -13,7 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 from actuator import Actuator, CurrentSource, Load, TorqueSource, loop_transfer, margins, trim
-from actuator.gain_models import gain_model
+from actuator.linear.gain_models import gain_model
 from controllers import Cascade, IntegralRemedies, Sampling
 from controllers.pid import PI, PID, P
 from gear import Bearing, Shaft, Transmission

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from actuator import simulate
-from actuator.compiled import compiler
-from actuator.run import STUCK
+from actuator.simulation.compiled import compiler
+from actuator.simulation.run import STUCK
 from studies.paper import figure_9, figure_9_inputs, figure_9_start
 
 DURATION = 10.0

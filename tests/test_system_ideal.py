@@ -25,7 +25,7 @@ from actuator import (
     UndervoltageFoldBack,
     simulate,
 )
-from actuator.temperature import ROOM
+from actuator.parts.temperature import ROOM
 from controllers import (
     FrictionCompensation,
     IntegralRemedies,

@@ -10,7 +10,7 @@ from random_actuators import draw
 
 from actuator import simulate
 from actuator.hybrid import MARGIN_BAND
-from actuator.run import STUCK
+from actuator.simulation.run import STUCK
 from gear.mesh import MESH_SPEED_NOMINAL
 from gear.transmission import BEARING_SPEED_NOMINAL
 

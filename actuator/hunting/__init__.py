@@ -1,0 +1,1 @@
+"""Does it hunt: verdicts, exact orbits, boundaries, rest, margins, causes and remedies."""

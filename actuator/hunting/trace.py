@@ -1,0 +1,158 @@
+"""What is looked at to say whether something hunts: the motion of a run or of a measured log, in the same form."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuator.simulation.run import FREE, STUCK, Run
+
+STILL = 1e-9  # rad; less motion than this is none
+SAME = 0.02  # relative difference up to which two swings or two periods of a run are the same
+GROWTH = 2.0  # factor over the observed time that is growth, and its inverse decay
+QUARTERS = 4  # of the time: a drift is a motion in the last that is no smaller than in the one before
+LOSS = "_loss"  # end of the names of outputs that are heat
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trace:
+    """Motion since the inputs stopped changing.
+
+    Attributes
+    ----------
+    time, load : ndarray, (n,)
+        [s], [rad].
+    motor, reference, current, loss : ndarray, (n,), or None
+        [rad], [rad], [A], [W]; None where they are not known.
+    standing : callable
+        Part of the time from start to end [s] in which nothing moves.
+    still : float
+        Motion [rad] that is none.
+    same : float
+        Relative difference up to which two swings or two periods are the same.
+    resolution : float
+        Of a sampled position [rad at the load]; zero where it is not.
+    drift : str
+        What still moves behind a standing load, in words; empty where nothing does.
+    release : float
+        Time [s] after which it lets go, at its present rate; nan where nothing moves or nothing is let go.
+    note : str
+        How standing still was told from moving; empty where it is known.
+    """
+
+    time: np.ndarray
+    load: np.ndarray
+    motor: np.ndarray | None
+    reference: np.ndarray | None
+    current: np.ndarray | None
+    loss: np.ndarray | None
+    standing: Callable[[float, float], float]
+    still: float = STILL
+    same: float = SAME
+    resolution: float = 0.0
+    drift: str = ""
+    release: float = float("nan")
+    note: str = ""
+
+
+def trace_of(run: Run, since: float | None = None) -> Trace:
+    """The trace of a run from a time [s] on; None for the time of the last change of an input."""
+    keep = run.t >= (_inputs_settled(run) if since is None else since)
+    losses = [values[keep] for name, values in run.signals.items() if name.endswith(LOSS) and "." not in name]
+
+    def part(name: str) -> np.ndarray | None:
+        return run[name][keep] if name in run.signals else None
+
+    drift, release = _drift(run, keep)
+    return Trace(
+        time=run.t[keep],
+        load=run["load_angle"][keep],
+        motor=part("motor_angle"),
+        reference=part("reference"),
+        current=part("current"),
+        loss=np.sum(losses, axis=0) if losses else None,
+        standing=lambda start, end: stuck_fraction(run, start, end),
+        resolution=_resolution(run),
+        drift=drift,
+        release=release,
+    )
+
+
+def stuck_fraction(run: Run, start: float, end: float) -> float:
+    """Part of the time from start to end in which every contact is stuck, from the times of the mode changes."""
+    modes = {name: str(row[0]) for name, row in run.modes.items()}
+    modes |= {change.contact: change.before for change in reversed(run.changes)}
+    # a contact that never sticks (no friction, or in its gap) does not tell whether the others stand
+    modes = {name: mode for name, mode in modes.items() if (run.modes[name] == STUCK).any()}
+    if not modes:
+        return 0.0
+    stuck, at = 0.0, float(start)
+    for change in run.changes:
+        if change.time > end:
+            break
+        if change.time > at:
+            stuck += (change.time - at) * all(mode in (STUCK, FREE) for mode in modes.values())
+            at = change.time
+        if change.contact in modes:
+            modes[change.contact] = change.after
+    stuck += (end - at) * all(mode in (STUCK, FREE) for mode in modes.values())
+    return float(stuck / (end - start))
+
+
+def pieces(signal: np.ndarray, count: int) -> list[float]:
+    """Peak to peak in each of `count` equal pieces."""
+    return [float(np.ptp(piece)) for piece in np.array_split(signal, count)]
+
+
+def last_change(time: np.ndarray, values: np.ndarray) -> float:
+    """Time from which on a signal has its last value."""
+    changes = np.flatnonzero(values != values[-1])
+    return float(time[min(changes[-1] + 1, len(values) - 1)]) if changes.size else 0.0
+
+
+def _inputs_settled(run: Run) -> float:
+    """Time of the last change of an input."""
+    return max((last_change(run.t, run[quantity.name]) for quantity in run.system.inputs), default=0.0)
+
+
+def _resolution(run: Run) -> float:
+    """Of the position that a sampled controller sees [rad at the load]."""
+    values = {q.name: float(value) for q, value in zip(_listed(run, "parameters"), run.parameters, strict=False)}
+    at_load = values.get("sensors.load.resolution", 0.0)
+    at_motor = values.get("sensors.motor.resolution", 0.0)
+    if not _listed(run, "clocks") or not (at_load or at_motor) or "motor_angle_at_load" not in run.signals:
+        return 0.0
+    far = int(np.argmax(abs(run["motor_angle_at_load"])))
+    turns = abs(run["motor_angle"][far] / run["motor_angle_at_load"][far]) if run["motor_angle_at_load"][far] else 1.0
+    return max(at_load, at_motor / turns)
+
+
+def _listed(run: Run, name: str) -> tuple:
+    return getattr(run.system, name, ())
+
+
+def _drift(run: Run, keep: np.ndarray) -> tuple[str, float]:
+    """The controller state that still moves behind a standing load, in words, and when what it loads lets go [s]."""
+    if keep.sum() < QUARTERS:
+        return "", float("nan")
+    for quantity in run.system.states:
+        if quantity.name.startswith("controller."):
+            before, after = pieces(run[quantity.name][keep], QUARTERS)[2:]
+            if after > max(STILL * quantity.nominal, before / GROWTH):
+                drifts = f"{quantity.name} still moves, by {after:.3g} {quantity.unit} in the last quarter"
+                return drifts, _release(run, keep)
+    return "", float("nan")
+
+
+def _release(run: Run, keep: np.ndarray) -> float:
+    """When the first margin of the present modes reaches zero at its rate in the last quarter [s]; nan for never."""
+    if not run.margins.size:
+        return float("nan")
+    time, margins = run.t[keep], run.margins[:, keep]
+    since = max([time[-1] - (time[-1] - time[0]) / QUARTERS, *(change.time for change in run.changes[-1:])])
+    late = time > since
+    if late.sum() < 2:  # noqa: PLR2004 - a rate needs two points
+        return float("nan")
+    rates = (margins[:, -1] - margins[:, late][:, 0]) / (time[-1] - time[late][0])
+    waits = [-margin / rate for margin, rate in zip(margins[:, -1], rates, strict=True) if rate < 0]
+    return float(min(waits, default=float("nan")))

@@ -1,0 +1,1 @@
+"""Operating points, linear models per contact mode, their loops, margins and poles."""

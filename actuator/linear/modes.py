@@ -1,0 +1,230 @@
+"""All linear models of an actuator at one operating point: one per contact mode that it can reach there."""
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
+
+import control
+import numpy as np
+
+from actuator.actuator import Actuator
+from actuator.hybrid import HybridSystem
+from actuator.linear.loop_margins import CUT, SLOW, Margins, margins
+from actuator.linear.model import linearize, loop_transfer
+from actuator.linear.sampled import without_counts
+from actuator.linear.trim import MOTIONS, NoEquilibrium, OperatingPoint, trim
+from actuator.parameters import require_known
+from actuator.simulation.run import FREE, STUCK, contact_labels, contact_names
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FREQUENCIES = 2 * np.pi * np.logspace(-2, 4, 1500)  # rad/s
+LOWEST_PHASE, HIGHEST_PHASE = -1.5 * np.pi, 0.5 * np.pi  # in which a loop starts
+
+
+class Envelope(NamedTuple):
+    """Between which gains [-] and phases [rad] all modes in which anything passes lie, over frequency [rad/s]."""
+
+    frequencies: np.ndarray
+    gain_low: np.ndarray
+    gain_high: np.ndarray
+    phase_low: np.ndarray
+    phase_high: np.ndarray
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModeModel:
+    """One contact mode at an operating point.
+
+    Attributes
+    ----------
+    name : str
+        "stuck", "forward", "backward" (of the output), with the contacts that differ.
+    point : OperatingPoint
+        State and modes; `linearize`, `loop_transfer` and `poles` take it.
+    equilibrium : bool
+        Whether it rests there. A mesh in its gap does not: its model holds while it flies.
+    """
+
+    name: str
+    point: OperatingPoint = field(repr=False)
+    equilibrium: bool
+
+    @property
+    def contacts(self) -> dict[str, str]:
+        """Mode of each contact, in words."""
+        return contact_labels(self.point.system.modes, self.point.m)
+
+    @property
+    def drifting(self) -> list[str]:
+        """States that may move at the point."""
+        return [] if self.equilibrium else [quantity.name for quantity in self.point.system.states]
+
+    def linear(self, inputs: Sequence[str], outputs: Sequence[str]) -> control.StateSpace:
+        """As `linearize`, without what is locked."""
+        return linearize(self.point, inputs, outputs, drifting=self.drifting, minimal=True)
+
+    def loop(self, at: str) -> control.StateSpace:
+        """As `loop_transfer`, without what is locked."""
+        return loop_transfer(self.point, at, drifting=self.drifting, minimal=True)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModeModels:
+    """The linear models of all modes that can be reached at an operating point.
+
+    Attributes
+    ----------
+    models : tuple of ModeModel
+        In the order stuck, forward, backward, then mixed ones, then with a mesh in its gap.
+    unreachable : mapping of str to str
+        Modes that cannot be, and why.
+    """
+
+    models: tuple[ModeModel, ...]
+    unreachable: Mapping[str, str]
+
+    def __iter__(self) -> Iterator[ModeModel]:
+        return iter(self.models)
+
+    def __len__(self) -> int:
+        return len(self.models)
+
+    def __getitem__(self, name: str) -> ModeModel:
+        """A model by the name of its mode; KeyError with the nearest names where there is none."""
+        require_known([name], [model.name for model in self.models], "reachable mode")
+        return next(model for model in self.models if model.name == name)
+
+    def loops(self, at: str) -> dict[str, control.StateSpace]:
+        """Loop transfer in each mode, opened at a named signal."""
+        return {model.name: model.loop(at) for model in self.models}
+
+    def margins(self, at: str) -> dict[str, Margins]:
+        """Margins of the loop in each mode."""
+        return {name: margins(loop) for name, loop in self.loops(at).items()}
+
+    def responses(self, given: str, seen: str) -> dict[str, control.StateSpace]:
+        """Response of one output to one input in each mode, all loops closed."""
+        return {model.name: model.linear([given], [seen]) for model in self.models}
+
+    def plot(self, at: str) -> "Figure":
+        """Bode plot of the loop opened at a named signal, a line per mode in front of the envelope."""
+        from actuator.linear.plots import plot_modes
+
+        return plot_modes(self.loops(at), f"loop opened at {at.replace('_', ' ')}")
+
+
+def mode_models(
+    plant: Actuator | HybridSystem,
+    *,
+    inputs: Mapping[str, float] | None = None,
+    guess: Mapping[str, float] | None = None,
+    parameters: Mapping[str, float] | None = None,
+    partial: bool = False,
+) -> ModeModels:
+    """One linear model per contact mode that can be reached at an operating point.
+
+    A mode can be reached where there is a state of rest in it in which friction holds the contacts that are stuck;
+    flanks follow from the load. Each mesh or coupling with a gap adds the model of its flight, with all else sliding.
+    Sensors are taken to read between their counts, without noise: a step has no derivative.
+
+    Parameters
+    ----------
+    plant : Actuator or HybridSystem
+        What to linearize.
+    inputs, guess, parameters : mapping of str to float
+        As for `trim`.
+    partial : bool
+        Whether modes are tried in which some contacts slide and others are stuck: 2^(contacts + 1) - 1 in all.
+
+    Returns
+    -------
+    ModeModels
+
+    Raises
+    ------
+    NoEquilibrium
+        Where no mode can be reached at all, with the reason of the first.
+    """
+    system = without_counts(plant).system() if isinstance(plant, Actuator) else plant
+    found: list[ModeModel] = []
+    reasons: dict[str, NoEquilibrium] = {}
+
+    def attempt(name: str, contacts: str | dict[str, str], start: Mapping[str, float] | None) -> None:
+        try:
+            point = trim(system, contacts, inputs=inputs, guess=start, parameters=parameters)
+        except NoEquilibrium as error:
+            reasons[name] = error
+        else:
+            found.append(ModeModel(name=name, point=point, equilibrium=True))
+
+    contacts = contact_names(system.modes)
+    for word in MOTIONS if contacts else ["forward"]:
+        attempt(word, word, guess)
+    if not found:
+        raise next(iter(reasons.values()))
+    sliding = [model for model in found if model.name != STUCK]
+    for model in sliding if partial else []:
+        for stuck in _mixed(contacts):
+            words = {name: STUCK if name in stuck else model.contacts[name] for name in contacts}
+            attempt(f"{model.name}, stuck {_short(stuck)}", words, model.point.states)
+    flights = [_in_gap(model, name) for model in sliding for name in _gapped(system)]
+    return ModeModels(models=(*found, *flights), unreachable={name: str(reason) for name, reason in reasons.items()})
+
+
+def _mixed(contacts: Sequence[str]) -> Iterator[tuple[str, ...]]:
+    """Some of the contacts, but not all and not none."""
+    for count in range(1, len(contacts)):
+        yield from itertools.combinations(contacts, count)
+
+
+def _short(contacts: Sequence[str]) -> str:
+    return " ".join(name.removeprefix("gear.") for name in contacts)
+
+
+def _gapped(system: HybridSystem) -> list[str]:
+    """Meshes and couplings with a gap, by path; not the end stops, which are mostly not touched."""
+    ends = [name.removesuffix(" flank +") for name in system.margin_names if name.endswith(" flank +")]
+    return [name for name in ends if not name.startswith("gear.stops.")]
+
+
+def _in_gap(model: ModeModel, name: str) -> ModeModel:
+    """The same with one mesh or coupling in its gap."""
+    point = model.point
+    changed = {f"{name}.flank": 0.0, f"{name}.motion": 0.0}
+    m = np.array([changed.get(mode, value) for mode, value in zip(point.system.modes, point.m, strict=True)])
+    flight = OperatingPoint(system=point.system, x=point.x, m=m, u=point.u, p=point.p, rates=point.rates)
+    return ModeModel(name=f"{model.name}, {FREE} {_short([name])}", point=flight, equilibrium=False)
+
+
+def bode(model: control.StateSpace, frequencies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Gain [-] and unwrapped phase [rad] of a response, the phase starting between -270 and +90 deg."""
+    point = np.exp(1j * frequencies * model.dt) if model.dt else 1j * frequencies
+    values = np.asarray(model(point))
+    phase = np.unwrap(np.angle(values))
+    turns = np.ceil((phase[0] - HIGHEST_PHASE) / (2 * np.pi))
+    return abs(values), phase - 2 * np.pi * turns
+
+
+def passes(model: control.StateSpace) -> bool:
+    """Whether anything passes a model: a stuck gear passes nothing on, but for rounding."""
+    end = np.pi / model.dt if model.dt else np.inf
+    grid = FREQUENCIES[(FREQUENCIES > SLOW) & (end > FREQUENCIES)]
+    return bool(bode(model, grid)[0].max() > CUT)
+
+
+def envelope(models: Mapping[str, control.StateSpace], frequencies: np.ndarray = FREQUENCIES) -> Envelope:
+    """Between which gains and phases the models lie in which anything passes.
+
+    Raises
+    ------
+    ValueError
+        Where nothing passes in any of them.
+    """
+    seen = [bode(model, frequencies) for model in models.values() if passes(model)]
+    if not seen:
+        raise ValueError(f"nothing passes in any of the modes {', '.join(models)}: there is no envelope")
+    gains, phases = (np.array(rows) for rows in zip(*seen, strict=True))
+    return Envelope(frequencies, gains.min(axis=0), gains.max(axis=0), phases.min(axis=0), phases.max(axis=0))

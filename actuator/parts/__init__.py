@@ -1,0 +1,1 @@
+"""What an actuator is made of: motors, inverter, link, heat, sensors, loads."""

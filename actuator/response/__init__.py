@@ -1,0 +1,1 @@
+"""Frequency responses, stiffness and bench tests by simulation."""

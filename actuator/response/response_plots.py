@@ -1,0 +1,105 @@
+"""Pictures of measured frequency responses, drawn on figures that need no display."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import control
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.figure import Figure
+from matplotlib.ticker import MultipleLocator
+
+from actuator.linear.plots import decibel, draw_modes
+from actuator.simulation.plots import DEGREES
+
+if TYPE_CHECKING:
+    from actuator.response.frequency_response import FrequencyResponse
+    from actuator.response.record import Spectrum
+
+CLEAR = 0.9  # coherence from which a spectrum is shown over others
+MOST_BELOW = 80.0  # dB below the largest that is shown
+
+
+def plot_responses(
+    measured: "FrequencyResponse",
+    linear: Mapping[str, control.StateSpace] | None = None,
+    overlay: Sequence["Spectrum"] = (),
+    **where: Any,
+) -> Figure:
+    """Gain and phase of every amplitude; points that do not settle are open, those that stand still are left out.
+
+    Spectra are laid over it where they are coherent.
+    """
+    data = measured.data
+    figure = Figure(figsize=(9, 6.4), layout="constrained")
+    gain, phase = figure.subplots(2, 1, sharex=True)
+    frequencies = data.frequency.values
+    unit = str(data.amplitude.attrs["units"])
+    scale, shown = (DEGREES, "deg") if unit == "rad" else (1.0, unit)
+    top, bottom = -np.inf, np.inf
+    if linear:
+        span = 2 * np.pi * np.logspace(np.log10(frequencies.min()), np.log10(frequencies.max()), 400)
+        step = max(float(model.dt or 0) for model in linear.values())
+        draw_modes(gain, phase, linear, span[span * step < np.pi], lines=False)
+    colors = colormaps["viridis"](np.linspace(0.05, 0.9, len(data.amplitude)))
+    for amplitude, color in zip(data.amplitude.values, colors, strict=True):
+        response = measured.select(amplitude=amplitude, **where).values
+        settled = measured.select("settled", amplitude=amplitude, **where).values.astype(bool)
+        moves = measured.select("moves", amplitude=amplitude, **where).values.astype(bool) & np.isfinite(response)
+        label = f"{scale * amplitude:.3g} {shown}"
+        if not moves.any():
+            gain.plot([], [], color=color, label=f"{label}: no motion")
+            continue
+        size = np.where(moves, decibel(abs(response)), np.nan)
+        angle = np.where(moves, _unwrapped(response, moves), np.nan)
+        top, bottom = max(top, np.nanmax(size)), min(bottom, np.nanmin(size))
+        for axes, values in ((gain, size), (phase, DEGREES * angle)):
+            axes.semilogx(frequencies, values, color=color, linewidth=1.2, label=label)
+            axes.plot(frequencies[settled], values[settled], "o", color=color, markersize=3)
+            axes.plot(frequencies[~settled], values[~settled], "o", color=color, markersize=4, mfc="w")
+    for k, spectrum in enumerate(overlay):
+        clear = spectrum.coherence >= CLEAR
+        hertz, response = spectrum.frequencies[clear], spectrum.response[clear]
+        if clear.any():
+            angle = DEGREES * _unwrapped(response, np.ones(len(response), bool))
+            for axes, values in ((gain, decibel(abs(response))), (phase, angle)):
+                axes.plot(hertz, values, ".", color=f"C{k + 1}", markersize=4, label=spectrum.label)
+    if np.isfinite(top):
+        gain.set_ylim(max(top - MOST_BELOW, bottom - 6), top + 6)
+    gain.set_ylabel("gain in dB")
+    phase.set_ylabel("phase in deg")
+    phase.set_xlabel("frequency in Hz")
+    phase.yaxis.set_major_locator(MultipleLocator(90))
+    for axes in (gain, phase):
+        axes.grid(alpha=0.3, which="both")
+    output = str(where.get("output", data.output.values[0])).replace("_", " ")
+    gain.set_title(f"{output} over {measured.given.replace('_', ' ')}; open points have not settled", fontsize="medium")
+    figure.legend(
+        *gain.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize="small", frameon=False
+    )
+    return figure
+
+
+def plot_spectrum(spectrum: "Spectrum") -> Figure:
+    """Gain, phase and coherence over frequency."""
+    figure = Figure(figsize=(9, 7), layout="constrained")
+    panels = figure.subplots(3, 1, sharex=True, height_ratios=(2, 2, 1))
+    phase = DEGREES * _unwrapped(spectrum.response, np.ones(len(spectrum.response), bool))
+    rows = (decibel(abs(spectrum.response)), phase, spectrum.coherence)
+    for axes, values, label in zip(panels, rows, ("gain in dB", "phase in deg", "coherence"), strict=True):
+        axes.semilogx(spectrum.frequencies, values, linewidth=1.2)
+        axes.set_ylabel(label)
+        axes.grid(alpha=0.3, which="both")
+    panels[1].yaxis.set_major_locator(MultipleLocator(90))
+    panels[2].set_ylim(0, 1.05)
+    panels[2].set_xlabel("frequency in Hz")
+    panels[0].set_title(spectrum.label, fontsize="medium")
+    return figure
+
+
+def _unwrapped(response: np.ndarray, moves: np.ndarray) -> np.ndarray:
+    """Phase [rad] without jumps where there is a response."""
+    angle = np.zeros(len(response))
+    angle[moves] = np.unwrap(np.angle(response[moves]))
+    first = angle[moves][0]
+    return angle - 2 * np.pi * np.ceil((first - np.pi / 2) / (2 * np.pi))

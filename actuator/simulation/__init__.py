@@ -1,0 +1,1 @@
+"""Running a hybrid system: windows, events, compiled code, signals, runs."""

@@ -26,7 +26,10 @@ class Refused(click.ClickException):
     exit_code = 2
 
 
-@click.command(epilog="Default points take a minute or two on two cores, twice that with --against.")
+@click.command(
+    epilog="The default points take one to two minutes on two cores, twice that with --against; "
+    "of sampled control many times that."
+)
 @click.argument("case", default="aileron", metavar="[CASE | PATH.toml]")
 @click.option(
     "--against", default=None, metavar="CASE|PATH.toml", help="A second actuator or tuning, beside the first."

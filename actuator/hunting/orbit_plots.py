@@ -66,9 +66,8 @@ def _circle(axes: Axes, orbit: Orbit) -> None:
     reach = max(1.2, 1.1 * float(abs(orbit.multipliers).max(initial=1.0)))
     axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal", xlabel="real", ylabel="imaginary")
     verdict = "stable" if orbit.stable else "unstable"
-    axes.set_title(
-        f"{verdict}, period {orbit.period:.6g} s, largest {abs(orbit.multipliers).max():.4g}", fontsize="medium"
-    )
+    largest = abs(orbit.multipliers).max()
+    axes.set_title(f"{verdict}, period {orbit.period:.6g} s\nlargest multiplier {largest:.4g}", fontsize="medium")
     axes.grid(alpha=0.3)
     axes.legend(fontsize="small", loc="lower left")
 

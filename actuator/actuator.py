@@ -169,6 +169,8 @@ class _Assembly:
         seen = Mechanics(contacts, forces, modes, angle, speed, torque)
         observe(book, seen, motion)
         site.losses.update(seen.losses())
+        for name, loss in site.losses.items():
+            book.output(f"{name}_loss", "W", loss)
         heat.feed(site.losses)
 
         arguments = [book.x(), m, book.u(), ca.vertcat(*(parameter.symbol for parameter in parameters))]

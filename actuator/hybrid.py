@@ -112,6 +112,11 @@ class HybridSystem:
         """How many states are continuous; the held ones follow."""
         return sum(not quantity.held for quantity in self.states)
 
+    @property
+    def hyperperiod(self) -> int:
+        """Ticks after which all clocks are due together again."""
+        return math.lcm(*(clock.every for clock in self.clocks))
+
     def tick_period(self, p: np.ndarray) -> float:
         """Time [s] between two ticks; infinite without clocks."""
         return math.inf if self.period is None else float(self.period(p))

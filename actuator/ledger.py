@@ -209,9 +209,6 @@ class Loop:
 
     def remember(self, law: Any, memory: Sequence[ca.SX], *inputs: Scalar) -> None:
         """How the memory of a law goes on."""
-        for k, kept in enumerate(memory):
-            self.after(
-                kept,
-                lambda k=k: law.rates(memory, *inputs)[k],
-                lambda k=k: law.advance(memory, *inputs, period=self.period)[k],
-            )
+        following = law.rates(memory, *inputs) if self.due is None else law.advance(memory, *inputs, period=self.period)
+        for kept, value in zip(memory, following, strict=True):
+            self.after(kept, lambda value=value: value, lambda value=value: value)

@@ -50,7 +50,7 @@ class Mechanics(NamedTuple):
 
 
 def observe(book: Ledger, seen: Mechanics, motion: Motion) -> None:
-    """Motion of motor and load, slip, friction and loss of every contact, loads of every mesh, energy and losses."""
+    """Motion of motor and load, slip, friction and loss of every contact, loads of every mesh, energy."""
     contacts, forces = seen.contacts, seen.forces
     gear = contacts.gear
     for side in ("motor", "load"):
@@ -78,5 +78,3 @@ def observe(book: Ledger, seen: Mechanics, motion: Motion) -> None:
         book.output(f"gear.{path}.torque", "N m", passed)
         book.output(f"gear.{path}.twist", "rad", forces.twists[path].angle)
     book.output("mechanical_energy", "J", seen.energy())
-    for name, loss in seen.losses().items():
-        book.output(f"{name}_loss", "W", loss)

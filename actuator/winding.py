@@ -73,8 +73,7 @@ def winding(site: "Site", voltages: PlantVoltages, torque: Scalar, speed: Scalar
     measured = [site.sensed("current", current, path=axis) for axis, current in zip(motor.axes, currents, strict=True)]
     references = voltages.currents(torque, speed, site.winding)
     electrical = [motor.pole_pairs * value for value in (angle, site.motion.motor_angle)] if _turns(motor) else [0, 0]
-    wanted, realize = _current_control(site, voltages, loop, references, measured, speed)
-    realized = realize(wanted, electrical[0])
+    realized = _current_control(site, voltages, references, measured, speed, electrical[0])
     applied = _applied(motor, loop, realized, electrical, speed)
     site.book.output("voltage", "V", applied[-1])
     applied[-1] += site.book.input(PREFIX + "voltage", "V")
@@ -101,16 +100,14 @@ def _current_source(site: "Site", motor: CurrentSource, torque: Scalar) -> Scala
     site.book.output("current", "A", currents[0] if currents else demanded)
     speed = site.motion.motor_speed
     site.losses.update(iron=motor.rotor.iron_loss(speed), drag=motor.rotor.friction_loss(speed))
-    for name, value in site.losses.items():
-        site.book.output(f"{name}_loss", "W", value)
     return motor.shaft_torque(currents or [demanded], site.motion.motor_angle, site.motion.motor_speed)
 
 
 def _current_control(
-    site: "Site", voltages: PlantVoltages, loop: Loop, references: list, measured: list, speed: Scalar
-) -> tuple[list[Scalar], Any]:
-    """The voltages demanded on each axis, and what realizes them and tells the integrals."""
-    cascade, motor = site.parts["controller"], site.parts["motor"]
+    site: "Site", voltages: PlantVoltages, references: list, measured: list, speed: Scalar, angle: Scalar
+) -> list[Scalar]:
+    """The voltages that the inverter realizes of those demanded on each axis, which drive the integrals."""
+    cascade, motor, loop = site.parts["controller"], site.parts["motor"], site.loops["current"]
     law: PI = cascade.current
     integrals = [loop.memory(f"controller.{axis}", law, "V") for axis in motor.axes]
     errors = [reference - current for reference, current in zip(references, measured, strict=True)]
@@ -120,15 +117,10 @@ def _current_control(
     ):
         proposal = law.proposed(integral[0], error, reference)
         wanted.append(proposal + emf if cascade.decoupling else proposal)
-
-    def realize(demanded: list[Scalar], angle: Scalar) -> list[Scalar]:
-        within = [limited(voltage, law.limit) for voltage in demanded]
-        realized = voltages.inverter.realize(within, angle, voltages.voltage)
-        for integral, error, want, got in zip(integrals, errors, demanded, realized, strict=True):
-            loop.integrate(law, integral, error, want, got)
-        return realized
-
-    return wanted, realize
+    realized = voltages.inverter.realize([limited(voltage, law.limit) for voltage in wanted], angle, voltages.voltage)
+    for integral, error, want, got in zip(integrals, errors, wanted, realized, strict=True):
+        loop.integrate(law, integral, error, want, got)
+    return realized
 
 
 def _applied(motor: Any, loop: Loop, realized: list, electrical: list, speed: Scalar) -> list[Scalar]:
@@ -147,7 +139,7 @@ def _applied(motor: Any, loop: Loop, realized: list, electrical: list, speed: Sc
 
 
 def _powers(site: "Site", voltages: PlantVoltages, currents: list, terminals: list, angle: Scalar) -> None:
-    """Where the electrical power goes, as outputs and for the thermal network; and what the link is left with."""
+    """Where the electrical power goes, and what the link is left with."""
     motor, book = site.parts["motor"], site.book
     losses = motor.losses(currents, site.motion.motor_speed, site.temperature)
     conduction = voltages.inverter.conduction_loss(currents, angle)
@@ -155,8 +147,6 @@ def _powers(site: "Site", voltages: PlantVoltages, currents: list, terminals: li
     site.losses.update(copper=losses.copper, iron=losses.iron, drag=losses.friction, inverter=conduction)
     book.output("electrical_power", "W", into_motor + conduction)
     book.output("magnetic_energy", "J", motor.magnetic_energy(currents) + motor.rotor.energy(site.motion.motor_angle))
-    for name, value in site.losses.items():
-        book.output(f"{name}_loss", "W", value)
     if voltages.link is not None:
         drawn = (into_motor + conduction) / voltages.voltage
         book.rate("link.voltage", voltages.link.rate(voltages.voltage, drawn))
@@ -164,5 +154,3 @@ def _powers(site: "Site", voltages: PlantVoltages, currents: list, terminals: li
         book.output("source_power", "W", powers.source)
         book.output("link_energy", "J", voltages.link.energy(voltages.voltage))
         site.losses.update(link=powers.source_loss, chopper=powers.chopper_loss)
-        for name in ("link", "chopper"):
-            book.output(f"{name}_loss", "W", site.losses[name])

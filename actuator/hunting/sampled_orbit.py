@@ -202,7 +202,7 @@ def close_sampled(  # noqa: PLR0913, PLR0917 - where to search, and how
     Errors as `find_sampled_orbit`.
     """
     ticks = tick_map(system, compiled)
-    hyper = math.lcm(*(clock.every for clock in system.clocks))
+    hyper = system.hyperperiod
     nearest = max(round(period / (hyper * system.tick_period(p))), 1)
     reasons = []
     for count in itertools.islice(_outward(nearest), PERIODS):
@@ -276,8 +276,7 @@ def _finished(  # noqa: PLR0913, PLR0917 - all that an orbit is
 ) -> SampledOrbit:
     values, vectors = np.linalg.eig(moved / ticks.scale[:, None] * ticks.scale)
     # the multiplier of the clock is that of the direction in which the cycle moves from tick to tick
-    hyper = math.lcm(*(clock.every for clock in ticks.system.clocks))
-    along = (ticks.passage(x, m, u, p, hyper, derivatives=False)[0] - x) / ticks.scale
+    along = (ticks.passage(x, m, u, p, ticks.system.hyperperiod, derivatives=False)[0] - x) / ticks.scale
     shares = np.abs(np.linalg.lstsq(vectors, along.astype(complex), rcond=None)[0])
     clock = int(np.argmax(shares * np.abs(values)))
     others = np.delete(values, clock).astype(complex)

@@ -10,7 +10,7 @@ from actuator.hybrid import HybridSystem
 from actuator.ledger import PREFIX
 from actuator.linear.jacobians import jacobians, require_smooth
 from actuator.linear.locked import unlocked
-from actuator.linear.sampled import lifted, slowest
+from actuator.linear.sampled import lifted
 from actuator.linear.trim import NoEquilibrium, OperatingPoint, rounding
 from actuator.parameters import require_known
 
@@ -69,7 +69,7 @@ def linearize(
     _require_still(point, drifting)
     selected = _select(system, inputs, outputs)
     if system.clocks:
-        every = slowest(system)
+        every = system.hyperperiod
         a, b, c, d = lifted(point, selected.columns, selected.rows, every)
         step = every * system.tick_period(point.p)
     else:
@@ -175,9 +175,9 @@ def loop_transfer(
     every = _renewed(system, at)
     selected = _select(system, [PREFIX + at], [at])
     matrices = lifted(point, selected.columns, selected.rows, every)
-    parts = slowest(system) // every
+    parts = system.hyperperiod // every
     channels = [at] if parts == 1 else [f"{at}_{k}" for k in range(parts)]
-    step = slowest(system) * system.tick_period(point.p)
+    step = system.hyperperiod * system.tick_period(point.p)
     closed = _model(point, matrices, channels, channels, step, minimal=minimal)
     return _cut((closed.A, closed.B, closed.C, closed.D), closed.state_labels, channels, step)
 

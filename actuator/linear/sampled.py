@@ -12,7 +12,6 @@ import numpy as np
 from scipy.linalg import expm
 
 from actuator.actuator import Actuator
-from actuator.hybrid import HybridSystem
 from actuator.linear.jacobians import jacobians, require_smooth, tick_jacobians
 from actuator.linear.trim import OperatingPoint
 from actuator.parameters import require_known
@@ -30,11 +29,6 @@ def without_counts(actuator: Actuator) -> Actuator:
     return replace(actuator, sensors=replace(sensors, **{name: smooth(getattr(sensors, name)) for name in names}))
 
 
-def slowest(system: HybridSystem) -> int:
-    """Ticks after which all clocks are due again."""
-    return int(np.lcm.reduce([clock.every for clock in system.clocks]))
-
-
 def lifted(point: OperatingPoint, columns: Sequence[int], rows: Sequence[int], every: int) -> tuple[np.ndarray, ...]:
     """A, B, C, D over the ticks after which all clocks are due again.
 
@@ -43,7 +37,7 @@ def lifted(point: OperatingPoint, columns: Sequence[int], rows: Sequence[int], e
     """
     a, b, c, d = jacobians(point)
     b, c, d = b[:, columns], c[rows], d[np.ix_(rows, columns)]
-    n, k, ticks = len(a), len(columns), slowest(point.system)
+    n, k, ticks = len(a), len(columns), point.system.hyperperiod
     step = expm(np.block([[a, b], [np.zeros((k, n + k))]]) * point.system.tick_period(point.p))
     transition, driven = step[:n, :n], step[:n, n:]
     parts = ticks // every
@@ -95,7 +89,7 @@ def harmonic_response(
     columns, rows = [input_names.index(i) for i in inputs], [output_names.index(o) for o in outputs]
     a, b, c, d = jacobians(point)
     b, c, d = b[:, columns], c[rows], d[np.ix_(rows, columns)]
-    ticks, period = slowest(system), system.tick_period(point.p)
+    ticks, period = system.hyperperiod, system.tick_period(point.p)
     maps = [tick_jacobians(point, tick) for tick in range(ticks)]
     found = np.empty((len(rows), len(columns), len(frequencies)), complex)
     n, k = len(a), len(columns)

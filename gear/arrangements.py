@@ -1,94 +1,24 @@
 """Arrangements: the usual gear sets as graphs of shafts and meshes.
 
 Each function is a few lines that name the shafts and say what meshes with what; nothing in the rest of the
-project knows these sets. Planets are lumped by count into one shaft: its inertia is that of all of them,
-its meshes share their load (`Mesh.count`), and their masses ride on the carrier. `separate` takes them apart again,
-where they are not equal or their load is not.
+project knows these sets. For planets that are lumped here and can be taken apart, see `gear.planets`.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Annotated, Literal
 
-from annotated_types import Ge, Unit
-
-from gear.elasticity import ElasticityLaws
-from gear.friction import FrictionLaws
 from gear.geometry import ExternalPair, GivenPair
 from gear.internal import InternalPair
-from gear.mesh import Mesh
-from gear.quantities import Inertia, check, check_count
+from gear.planets import RIGID, MeshLaws, Planets
 from gear.shafts import Bearing, Shaft
 from gear.transmission import Transmission
 
 CENTERS = 1e-6  # relative difference up to which two center distances are the same
 
 
-@dataclass(frozen=True, kw_only=True)
-class MeshLaws:
-    """What all meshes of an arrangement have in common; the defaults are rigid and lossless.
-
-    Parameters
-    ----------
-    elasticity, friction
-        As for `Mesh`, per tooth contact: `count` planets are that many times as stiff.
-    stick_by : "conjugate speed" or "mesh speed"
-        As for `Mesh`, but the conjugate speed by default: a light planet in a ring cannot stick by mesh speed.
-    """
-
-    elasticity: ElasticityLaws | None = None
-    friction: FrictionLaws | None = None
-    stick_by: Literal["mesh speed", "conjugate speed"] = "conjugate speed"
-
-    def mesh(self, a: str, b: str, pair: object, *, carrier: str | None = None, count: int = 1) -> Mesh:
-        """A mesh with these laws."""
-        return Mesh(
-            a=a,
-            b=b,
-            carrier=carrier,
-            pair=pair,  # pyright: ignore[reportArgumentType]
-            elasticity=self.elasticity,
-            friction=self.friction,
-            stick_by=self.stick_by,
-            count=count,
-        )
-
-
-@dataclass(frozen=True, kw_only=True)
-class Planets:
-    """Equal planets on one carrier.
-
-    Parameters
-    ----------
-    count : int
-        How many.
-    inertia : float
-        Of one about its own axis [kg m^2].
-    mass : float
-        Of one [kg]; it rides on the carrier.
-    """
-
-    count: int
-    inertia: Inertia
-    mass: Annotated[float, Unit("kg"), Ge(0)] = 0.0
-
-    def __post_init__(self) -> None:
-        check(self)
-        check_count(self, "count")
-
-    def shaft(self) -> Shaft:
-        """All planets as one shaft."""
-        return Shaft(inertia=self.count * self.inertia)
-
-    def carrier(self, inertia: float, distance: float) -> Shaft:
-        """The carrier [kg m^2] with the planets' masses at the center distance [m]."""
-        return Shaft(inertia=inertia + self.count * self.mass * distance**2)
-
-
 def train(
     stages: Sequence[ExternalPair | GivenPair],
     inertias: Sequence[float],
-    laws: MeshLaws | Sequence[MeshLaws] = MeshLaws(),
+    laws: MeshLaws | Sequence[MeshLaws] = RIGID,
     bearings: Mapping[str, Bearing] | None = None,
 ) -> Transmission:
     """Spur gears one after the other on fixed axes: shafts shaft_0 (input) to shaft_n (output).
@@ -121,7 +51,7 @@ def train(
 
 
 def spur_pair(
-    pair: ExternalPair | GivenPair | InternalPair, inertia_a: float, inertia_b: float, laws: MeshLaws = MeshLaws()
+    pair: ExternalPair | GivenPair | InternalPair, inertia_a: float, inertia_b: float, laws: MeshLaws = RIGID
 ) -> Transmission:
     """Two wheels on fixed axes: shafts wheel_a (input) and wheel_b (output)."""
     return Transmission(
@@ -138,7 +68,7 @@ def planetary(  # noqa: PLR0913 - as many as the set has parts
     planet_ring: InternalPair,
     planets: Planets,
     inertias: Mapping[str, float],
-    laws: MeshLaws = MeshLaws(),
+    laws: MeshLaws = RIGID,
     input: str = "sun",  # noqa: A002 - the field of Transmission it fills
     output: str = "carrier",
     fixed: tuple[str, ...] = ("ring",),
@@ -182,7 +112,7 @@ def stepped_planetary(  # noqa: PLR0913 - as many as the set has parts
     step_ring: InternalPair,
     planets: Planets,
     inertias: Mapping[str, float],
-    laws: MeshLaws = MeshLaws(),
+    laws: MeshLaws = RIGID,
     input: str = "sun",  # noqa: A002
     output: str = "carrier",
     fixed: tuple[str, ...] = ("ring",),
@@ -211,7 +141,7 @@ def wolfrom(
     step_ring: InternalPair,
     planets: Planets,
     inertias: Mapping[str, float],
-    laws: MeshLaws = MeshLaws(),
+    laws: MeshLaws = RIGID,
 ) -> Transmission:
     """Wolfrom set: the planets' first wheel meshes with sun and fixed ring, their second with the turning output ring.
 
@@ -242,7 +172,7 @@ def ravigneaux(  # noqa: PLR0913 - as many as the set has parts
     short_planets: Planets,
     long_planets: Planets,
     inertias: Mapping[str, float],
-    laws: MeshLaws = MeshLaws(),
+    laws: MeshLaws = RIGID,
     input: str = "small_sun",  # noqa: A002
     output: str = "ring",
     fixed: tuple[str, ...] = ("carrier",),
@@ -292,7 +222,7 @@ def differential(  # noqa: PLR0913 - as many as the set has parts
     planets_between: ExternalPair,
     planets: Planets,
     inertias: Mapping[str, float],
-    laws: MeshLaws = MeshLaws(),
+    laws: MeshLaws = RIGID,
     input: str = "carrier",  # noqa: A002
     output: str = "right_sun",
     fixed: tuple[str, ...] = (),
@@ -322,60 +252,6 @@ def differential(  # noqa: PLR0913 - as many as the set has parts
         output=output,
         fixed=fixed,
     )
-
-
-def separate(gear: Transmission, *shafts: str) -> Transmission:
-    """The same set with a shaft and meshes of its own for every planet, so that they can differ.
-
-    Shaft planets becomes planets_1, planets_2, ..., its mesh sun_planet becomes sun_planet_1, sun_planet_2, ...;
-    change one with `dataclasses.replace` (another gap, stiffness, transmission error) and the load is shared unequally.
-    More meshes can then stick than shafts can move: their friction is the smallest that holds, see `gear.stiction`.
-
-    Parameters
-    ----------
-    gear : Transmission
-        Of this module, with lumped planets and nothing but meshes on them.
-    shafts : str
-        Names of the planets' shafts; both of sets with short and long planets.
-
-    Raises
-    ------
-    ValueError
-        Where a shaft is not that of several planets, or carries more than meshes.
-    """
-    counts = {name: {mesh.count for mesh in gear.meshes.values() if name in (mesh.a, mesh.b)} for name in shafts}
-    found = set().union(*counts.values())
-    if len(found) != 1 or min(found) == 1 or not all(counts.values()):
-        raise ValueError(
-            f"separate: shafts {', '.join(shafts)} must be those of equally many lumped planets, got meshes with count "
-            f"{', '.join(map(str, sorted(found))) or 'none'}"
-        )
-    loaded = [
-        f"{kind}.{name}"
-        for kind in ("bearings", "couplings", "drags")
-        for name, part in getattr(gear, kind).items()
-        if {getattr(part, end, None) for end in ("shaft", "a", "b")} & set(shafts)
-    ]
-    if loaded:
-        raise ValueError(f"separate: {loaded[0]} is that of all planets together; add it to the separate ones instead")
-    numbers = range(1, found.pop() + 1)
-
-    def own(name: str, k: int) -> str:
-        return f"{name}_{k}" if name in shafts else name
-
-    apart: dict[str, Shaft] = {}
-    for name, shaft in gear.shafts.items():
-        share = shaft.inertia / len(numbers)
-        apart |= {own(name, k): Shaft(inertia=share) for k in numbers} if name in shafts else {name: shaft}
-    meshes: dict[str, Mesh] = {}
-    for name, mesh in gear.meshes.items():
-        split = not {mesh.a, mesh.b}.isdisjoint(shafts)
-        meshes |= (
-            {f"{name}_{k}": replace(mesh, a=own(mesh.a, k), b=own(mesh.b, k), count=1) for k in numbers}
-            if split
-            else {name: mesh}
-        )
-    return replace(gear, shafts=apart, meshes=meshes)
 
 
 def _same_centers(pairs: Mapping[str, ExternalPair | InternalPair]) -> float:

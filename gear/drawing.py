@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from gear.efficiency import balance
+from gear.balance import balance
 from gear.geometry import GivenPair
 from gear.mesh import Mesh
 from gear.screw import ScrewPair

@@ -2,12 +2,10 @@
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Protocol
 
-from gear.involute import Gearing, Path, Rack, Teeth, gearing
-from gear.quantities import Arm, Factor, HelixAngle, Length, Number, PressureAngle, Scalar, check, show
-from gear.tooth_checks import require_possible, require_teeth
+from gear.quantities import Arm, HelixAngle, Length, Number, PressureAngle, Scalar, check, show
+from gear.toothed_pair import ToothedPair
 
 
 class Pair(Protocol):
@@ -60,7 +58,7 @@ class Pair(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ExternalPair:
+class ExternalPair(ToothedPair):
     """External involute pair, spur or helical, with or without profile shift, at its distance without backlash.
 
         inv(alpha_w) = inv(alpha_t) + 2 tan(alpha_n) (shift_a + shift_b) / (teeth_a + teeth_b)
@@ -99,81 +97,6 @@ class ExternalPair:
     ----------
     F. L. J. van der Linden, "Modeling of geared positioning systems", eqs. (21), (27), (30); ISO 21771 for the teeth.
     """
-
-    teeth_a: int
-    teeth_b: int
-    module: Length
-    pressure_angle: PressureAngle = math.radians(20.0)
-    helix_angle: HelixAngle = 0.0
-    shift_a: Number = 0.0
-    shift_b: Number = 0.0
-    addendum_a: Factor = 1.0
-    addendum_b: Factor = 1.0
-    tip_radius_a: Length | None = None
-    tip_radius_b: Length | None = None
-
-    def __post_init__(self) -> None:
-        check(self)
-        require_teeth(self)
-        require_possible(type(self).__name__, *self._parts())
-
-    def _parts(self) -> tuple[Rack, Teeth, Teeth]:
-        rack = Rack(self.module, self.pressure_angle, self.helix_angle)
-        a = Teeth(self.teeth_a, self.shift_a, self.addendum_a, self.tip_radius_a)
-        return rack, a, Teeth(self.teeth_b, self.shift_b, self.addendum_b, self.tip_radius_b)
-
-    @cached_property
-    def gearing(self) -> Gearing:
-        """Everything that follows from the teeth: radii, angles, center distance, contact and overlap ratio."""
-        return gearing(*self._parts())
-
-    @property
-    def radius_a(self) -> Scalar:
-        """Working pitch radius [m] of wheel A."""
-        return self.gearing.radius_a
-
-    @property
-    def radius_b(self) -> Scalar:
-        """Working pitch radius [m] of wheel B."""
-        return self.gearing.radius_b
-
-    @property
-    def working_angle(self) -> Scalar:
-        """Working transverse pressure angle [rad]."""
-        return self.gearing.angle
-
-    @property
-    def base_helix_angle(self) -> Scalar:
-        """Helix angle at the base cylinders, beta_b [rad]."""
-        return self.gearing.base_helix_angle
-
-    @property
-    def tooth_pitch(self) -> Scalar:
-        """Feed from tooth to tooth on the working pitch circles [m]."""
-        return self.gearing.pitch
-
-    @property
-    def friction_factor(self) -> Scalar:
-        """Averaged friction force on the bearings per unit of friction scalar, d_F [-]."""
-        return self.path().friction_factor
-
-    @property
-    def friction_arm_a(self) -> Scalar:
-        """Averaged lever arm of the friction on wheel A, -d_tauA [m]."""
-        return self.path().friction_arm_a
-
-    @property
-    def friction_arm_b(self) -> Scalar:
-        """Averaged lever arm of the friction on wheel B, d_tauB [m]."""
-        return self.path().friction_arm_b
-
-    def path(self) -> Path:
-        """Path of contact from the tip circle of B to the tip circle of A."""
-        return self.gearing.path()
-
-    def contact_ratio(self) -> Scalar:
-        """Average number of tooth pairs in contact in one plane [-]."""
-        return self.gearing.contact_ratio()
 
 
 @dataclass(frozen=True, kw_only=True)

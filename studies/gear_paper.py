@@ -31,7 +31,9 @@ from gear import (
     Transmission,
     elasticity_curves,
 )
-from gear.efficiency import balance, breakout, efficiency
+from gear.balance import balance
+from gear.breakout import breakout
+from gear.efficiency import efficiency
 from gear.elastic_law import AT_REST
 from gear.motion import Sliding
 from gear.tabulated_efficiency import EfficiencyPoint

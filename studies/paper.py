@@ -14,7 +14,8 @@ from typing import Literal
 from actuator import Actuator, Constant, Load, Ramp, Sine, TorqueSource
 from actuator.simulation.signals import Signal
 from gear import Bearing, Coulomb, ExternalPair, GivenPair, InternalPair, Linear, Mesh, Shaft, Transmission
-from gear.arrangements import MeshLaws, Planets, stepped_planetary
+from gear.arrangements import stepped_planetary
+from gear.planets import MeshLaws, Planets
 
 PRELOAD = 5.0  # N m on wheel A
 RAMP = 1.0  # N m/s

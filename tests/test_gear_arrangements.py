@@ -24,19 +24,18 @@ from gear import (
     TransmissionError,
 )
 from gear.arrangements import (
-    MeshLaws,
-    Planets,
     differential,
     planetary,
     ravigneaux,
-    separate,
     spur_pair,
     stepped_planetary,
     train,
     wolfrom,
 )
+from gear.balance import balance
 from gear.drawing import draw, table
-from gear.efficiency import balance, efficiency
+from gear.efficiency import efficiency
+from gear.planets import MeshLaws, Planets, separate
 from studies.paper import compound_planetary, compound_planetary_inputs
 
 LOSSY = MeshLaws(elasticity=Linear(stiffness=1e8, damping=2e4), friction=Coulomb(sliding=0.1, static=0.15))

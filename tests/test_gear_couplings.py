@@ -23,8 +23,9 @@ from gear import (
     Transmission,
     jam,
 )
+from gear.balance import balance
 from gear.couplings import Twist
-from gear.efficiency import balance, efficiency
+from gear.efficiency import efficiency
 
 STIFFNESS, DAMPING, GAP = 2e4, 30.0, 0.02
 PLAIN = Coupling(a="a", b="b", stiffness=STIFFNESS, damping=DAMPING)

@@ -10,16 +10,11 @@ import pytest
 
 from actuator import Actuator, Load, TorqueSource, simulate
 from gear import Backlash, Bearing, Coulomb, ExternalPair, Linear, Mesh, Shaft, Transmission
-from gear.arrangements import MeshLaws, spur_pair, train
-from gear.efficiency import (
-    balance,
-    breakout,
-    efficiency,
-    efficiency_map,
-    mesh_efficiencies,
-    plot_efficiency,
-    scaled,
-)
+from gear.arrangements import spur_pair, train
+from gear.balance import balance
+from gear.breakout import breakout, scaled
+from gear.efficiency import efficiency, efficiency_map, mesh_efficiencies, plot_efficiency
+from gear.planets import MeshLaws
 from gear.shafts import Drag
 
 PAIR = ExternalPair(teeth_a=20, teeth_b=60, module=1e-3)

@@ -26,8 +26,11 @@ from gear import (
     Thickening,
     at_temperature,
 )
-from gear.arrangements import MeshLaws, spur_pair
-from gear.efficiency import balance, breakout, efficiency_map
+from gear.arrangements import spur_pair
+from gear.balance import balance
+from gear.breakout import breakout
+from gear.efficiency import efficiency_map
+from gear.planets import MeshLaws
 from gear.shafts import Drag
 from studies.converter import converter
 

@@ -73,7 +73,7 @@ def test_dymola_s_rod_overshoots_and_settles_on_the_command(clean):
 
 def test_the_gear_has_the_efficiencies_and_bearing_friction_of_the_data_sheet():
     """-tau_b/ratio = eta tau_a - tau_f with the motor driving, tau_a/eta - tau_f with the load driving."""
-    from gear.efficiency import balance
+    from gear.balance import balance
 
     gear, ratio = dymola.actuator_with_noise().gear, dymola.RATIO
     assert gear.ratio() == pytest.approx(ratio)

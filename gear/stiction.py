@@ -16,7 +16,8 @@ sweeps (so that it can be compiled and differentiated): first all contacts hold 
 whatever exceeds its limit and can move is broken loose, falls to its sliding limit, and the rest is asked
 again. Contacts are redundant where several lock the same shafts (two bearings and the mesh between them);
 their friction is then not unique, and the smallest friction that does the job (least squares, weighted by G)
-is taken.
+is taken. Whether a contact holds is asked of the friction that it has in the run: the regularized problem takes a
+little load off it, and a contact held for that would be overloaded in the run from the first moment on.
 
 References
 ----------
@@ -38,6 +39,9 @@ REFINEMENTS = 2  # each takes the leftover acceleration down by REGULARIZATION
 INDEPENDENT = 1e-9  # a contact can slip by itself if the others leave this part of its own 1/inertia
 SHARPER = 1e-12  # regularization where only that is asked, so that light shafts behind heavy ones are told from locked
 RELEASED = 1 - 1e-6  # a contact that has just let go is not to hold again at the very same limit
+ROUNDING = 1e-12  # of a limit: the same for the others, where a load is exactly at it
+PATIENCE = 1e-6  # the same in late sweeps: rounding grows with the ratio of inertias, where many are at their limits
+SHARED = 1e-5  # of a limit: redundant contacts may share their load as much otherwise than with the smallest friction
 
 
 def friction(compliance: Matrix, demand: Matrix, held: Matrix, given: Matrix, redundant: bool) -> Matrix:
@@ -118,16 +122,24 @@ def _sweep_function(count: int, redundant: bool) -> ca.Function:
         ca.SX.sym("compliance", count, count),
         *(ca.SX.sym(name, count) for name in ("demand", "static", "forward", "backward", "rest", "given", "released")),
     )
-    fresh = ca.if_else(problem.released, RELEASED, 1)
-    upper, lower = (ca.if_else(broken, fresh * onset, problem.static) for onset in (problem.forward, problem.backward))
+    upper, lower = (ca.if_else(broken, onset, problem.static) for onset in (problem.forward, problem.backward))
     held = problem.rest * ca.eq(status, 0)
-    # the regularized problem as it is, not refined: it alone has one solution for the sweeps to settle on
-    compliance = problem.compliance * (1 + REGULARIZATION * ca.SX.eye(count)) if redundant else problem.compliance
     given = ca.if_else(problem.rest, ca.if_else(status > 0, upper, -lower), problem.given)
-    force = friction(compliance, problem.demand, held, given, redundant=False)
-    acceleration = problem.demand - compliance @ force
-    exceeds = ca.if_else(force > upper, 1, ca.if_else(force < -lower, -1, 0))
-    stays = ca.if_else(status * acceleration < 0, 0, status)
+    force = friction(problem.compliance, problem.demand, held, given, redundant)
+    fresh = ca.if_else(problem.released, RELEASED, 1)
+    exceeds = ca.if_else(force > fresh * upper, 1, ca.if_else(force < -fresh * lower, -1, 0))
+    # what acceleration falls short by that part of the limit is no return, so that no contact is turned to and fro
+    usual = ca.diag(problem.compliance) * ca.fabs(given)
+    along = status * (problem.demand - problem.compliance @ force)
+    patience = ca.if_else(single, PATIENCE, ROUNDING)
+    returns = along < -(1 - fresh + patience) * usual
+    can_slip = _can_slip(problem.compliance, held) if redundant else ca.SX.ones(count)
+    if redundant:
+        # what is locked has no acceleration that tells, but in the regularized problem, which has one solution
+        shifted = problem.compliance * (1 + REGULARIZATION * ca.SX.eye(count))
+        creep = status * (problem.demand - shifted @ friction(shifted, problem.demand, held, given, redundant=False))
+        returns = ca.if_else(can_slip, returns, creep < -SHARED * REGULARIZATION * usual)
+    stays = ca.if_else(returns, 0, status)
     proposal = problem.rest * ca.if_else(ca.eq(status, 0), exceeds, stays)
 
     first, found = [], 0
@@ -137,7 +149,7 @@ def _sweep_function(count: int, redundant: bool) -> ca.Function:
         found = ca.logic_or(found, differs)
     settled = ca.logic_not(found)
 
-    slips = ca.fabs(status) * (_can_slip(problem.compliance, held) if redundant else 1)
+    slips = ca.fabs(status) * can_slip
     loosened = ca.if_else(settled, ca.fmax(broken, slips), broken)
     motion = status * ca.if_else(slips, 1, AT_LIMIT)
     done = ca.logic_and(settled, ca.logic_not(ca.sum1(ca.fabs(loosened - broken))))

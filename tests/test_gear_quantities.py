@@ -44,7 +44,10 @@ def components():
         thing
         for module in modules
         for thing in vars(module).values()
-        if is_dataclass(thing) and thing.__module__ == module.__name__ and "Parameters\n" in inspect.getdoc(thing)
+        if isinstance(thing, type)
+        and is_dataclass(thing)
+        and thing.__module__ == module.__name__
+        and "Parameters\n" in inspect.getdoc(thing)
     ]
 
 

@@ -268,6 +268,14 @@ def test_two_bearings_and_the_mesh_between_them_break_away_together(torque, move
     assert list(decided(problem, redundant=True) % 2) == ([1, 0, 1] if moves else [0, 0, 0])
 
 
+@pytest.mark.parametrize("light", [1e-1, 1e-2])
+def test_a_shaft_breaks_away_at_the_sum_of_both_limits_with_a_light_one_behind_it(light):
+    """The regularization once held it up to 1e-8 of the ratio of inertias beyond that, overloaded."""
+    for part, moves in ((1 - 3e-9 / light, False), (1 + 3e-9 / light, True)):
+        problem = two_shafts(inertia=(1.0, light), ratio=1.0, static=(1.0, 1e3, 1.0), outside=(2.0 * part, 0.0))
+        assert list(decided(problem, redundant=True) % 2) == ([1, 0, 1] if moves else [0, 0, 0])
+
+
 @pytest.mark.parametrize(
     "light",
     [1e-4, 1e-6],
@@ -289,6 +297,40 @@ def test_motion_of_a_train_with_redundant_bearings_is_consistent(problem):
     assert (abs(acceleration[~slips]) <= 1e-7 * size).all()
     assert (acceleration[slips] * motion[slips] >= -1e-7 * size).all()
     assert (abs(force) <= problem.static * (1 + 1e-6)).all()
+
+
+def at_their_limits(rng):
+    """Some contacts of a train with sliding = static, most of them exactly at their limit or within 1e-7 of it."""
+    count = int(rng.integers(2, 5))
+    inertia = 10 ** rng.uniform(-5, -2, count)
+    slips, torques = list(np.eye(count)), list(np.eye(count))
+    for k in range(count - 1):
+        pair = ExternalPair(teeth_a=int(rng.integers(17, 30)), teeth_b=int(rng.integers(30, 60)), module=1e-3)
+        slips.append(np.zeros(count))
+        torques.append(np.zeros(count))
+        slips[-1][k : k + 2] = pair.radius_a / 2, -pair.radius_b / 2
+        torques[-1][k : k + 2] = pair.friction_arm_a, -pair.friction_arm_b
+    kept = np.sort(rng.choice(len(slips), size=int(rng.integers(2, len(slips) + 1)), replace=False))
+    compliance = np.array(slips)[kept] / inertia @ np.array(torques)[kept].T
+    static = np.where(kept < count, 10 ** rng.uniform(-3, 0, len(kept)), 10 ** rng.uniform(0, 3, len(kept)))
+    rest = (rng.random(len(kept)) < 0.85).astype(float)
+    part = np.where(rng.random(len(kept)) < 0.7, rng.choice([-1.0, 1.0], len(kept)), rng.uniform(-1, 1, len(kept)))
+    force = static * np.where(rest, part, np.sign(part))
+    near = 1 + rng.choice([0, 1e-14, 1e-12, 3e-10, 5e-9, 1e-7]) * rng.choice([-1, 1])
+    released = rest * (rng.random(len(kept)) < 0.2)
+    return rest_problem(compliance, near * compliance @ force, static, rest=rest, given=force, released=released)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_no_contact_that_holds_is_overloaded_in_the_run_where_static_is_sliding_friction(seed):
+    rng = np.random.default_rng(seed)
+    for _ in range(40):
+        problem = at_their_limits(rng)
+        motion = decided(problem, redundant=True)
+        held = (motion == STUCK) & (problem.rest == 1)
+        given = np.where(problem.rest, np.sign(motion) * problem.static, problem.given)
+        force = np.array(_friction_function(len(held))(problem.compliance, problem.demand, held.astype(float), given))
+        assert (abs(force.ravel()) <= problem.static * (1 + NEAR))[held].all()
 
 
 @settings(deadline=None, max_examples=50)

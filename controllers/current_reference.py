@@ -10,6 +10,7 @@ from controllers.shapes import limited
 
 TINY = 1e-12  # of the normalized torque: its square is below rounding, its inverse is finite
 FAR_INSIDE = 100.0  # flux limits beyond this times the largest flux do not limit, and stay finite at standstill
+LEAST_VOLTAGE = 1e-3  # V; a limit of zero has no ellipse
 HALVINGS = 8  # of the bracket of the angle, until the torque over it is as good as straight
 NEWTON_STEPS = 8  # behind them; to rounding, but at the pull-out torque, where each takes a quarter of the rest
 BELOW_ONE = 1 - 1e-12  # largest cosine, as the arc cosine has no slope at 1
@@ -32,7 +33,8 @@ class CurrentReference:
 
     The resistance is neglected: a voltage limit less R times the current limit is on the safe side. Where the
     current limit cannot weaken the flux enough, no point keeps both; the current limit is kept then, with all
-    current against the flux.
+    current against the flux. Where the resistance leaves nothing of a sagging voltage, the current cancels the flux at
+    any speed but zero.
 
     Parameters
     ----------
@@ -108,8 +110,9 @@ class CurrentReference:
         speed : float or SX
             Of the rotor [rad/s].
         voltage_limit, current_limit : float or SX
-            Of the magnitude of the dq vectors [V peak], [A peak], positive.
+            Of the magnitude of the dq vectors [V peak], [A peak]; a voltage of zero or less leaves nothing.
         """
+        voltage_limit = ca.fmax(voltage_limit, LEAST_VOLTAGE)
         limit_d, limit_q = self.largest(current_limit)
         torque = limited(torque, self.torque(limit_d, limit_q))
         direct, quadrature = self.least(torque)

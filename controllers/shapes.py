@@ -11,8 +11,8 @@ def limited(value: Scalar, limit: Scalar | None) -> Scalar:
 
 
 def dead_zone(value: Scalar, band: Scalar) -> Scalar:
-    """Zero within +-band, shifted towards zero by `band` outside, so without a jump."""
-    return value - limited(value, band)
+    """Zero within +-band, shifted towards zero by `band` outside, so without a jump; of slope 1 at a band of zero."""
+    return ca.fmax(value - band, 0) + ca.fmin(value + band, 0)
 
 
 def direction(value: Scalar, band: Scalar, width: Scalar) -> Scalar:

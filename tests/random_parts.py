@@ -155,9 +155,7 @@ def _design(actuator):
         )
     elif controller is not None:
         controller = _without_reset(controller)
-    # a rectifier above its own voltage lets the link be: no slope leads a search back
-    link = actuator.link and replace(actuator.link, source="battery")
-    return replace(actuator, controller=controller, sampling=None, sensors=Sensors(), link=link)
+    return replace(actuator, controller=controller, sampling=None, sensors=Sensors())
 
 
 def _without_reset(law):

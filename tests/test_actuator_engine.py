@@ -161,7 +161,7 @@ def test_a_margin_that_a_reset_leaves_negative_is_found_and_settled():
 @pytest.fixture
 def few_events(monkeypatch):
     """Windows that hold a hundred events, so that failing takes no time."""
-    monkeypatch.setattr("actuator.simulation.window.MAX_EVENTS", 100)
+    monkeypatch.setattr("actuator.simulation.integration.MAX_EVENTS", 100)
 
 
 @pytest.mark.parametrize("compiled", [False, pytest.param(True, marks=needs_compiler)])

@@ -6,6 +6,7 @@ triangle; the transfer function of a filter through which noise was sent.
 """
 
 import dataclasses
+import itertools
 import json
 import math
 from functools import cache
@@ -16,6 +17,7 @@ from scipy import signal
 
 from actuator import (
     Actuator,
+    Gravity,
     Load,
     SineStream,
     ThermalNetwork,
@@ -160,6 +162,42 @@ def test_a_bias_load_and_a_set_of_parameters_change_the_response():
     assert found.data.response.dims == ("set", "load", "amplitude", "frequency", "output")
     warm, cold = (abs(found.select(set=name, amplitude=0.1).item()) for name in ("warm", "cold"))
     assert cold < 0.95 * warm
+
+
+def test_a_small_sine_is_the_linear_response_at_its_bias_load_and_its_set_of_parameters():
+    # a weight on a spring pulls back the less, the farther a bias load holds it from its lowest point
+    weight = Load(stiffness=5.0, gravity=Gravity(moment=20.0))
+    plant = dataclasses.replace(servo(), controller=None, load=weight)
+    sets = {"warm": {}, "cold": {"gear.bearings.guide.viscous": 4.0}}
+    loads, frequencies = [-15.0, 0.0, 20.0], [0.5, 1.5]
+    found = measured(
+        plant, amplitudes=[1e-2], frequencies=frequencies, given="load_torque", loads=loads, sets=sets
+    )  # fmt: skip
+    seen = set()
+    for (name, changes), load in itertools.product(sets.items(), loads):
+        point = trim(plant, "forward", inputs={"load_torque": load}, parameters=changes)
+        model = linearize(point, ["load_torque"], ["load_angle"])
+        frd = found.frd(1e-2, set=name, load=load)
+        np.testing.assert_allclose(frd.frdata[0, 0], model(2j * np.pi * np.array(frequencies)), rtol=1e-3)
+        seen.add(round(abs(frd.frdata[0, 0, 0]), 4))
+    assert len(seen) == len(sets) * len(loads)  # each is another
+
+
+def test_the_distortion_of_dry_friction_is_that_of_a_square_wave():
+    plant = servo(sticks=True, integral=0.0)
+    found = measured(
+        plant, amplitudes=[10.0], frequencies=[1.0], seen=("load_angle", "gear.bearings.guide.friction"),
+        sets={"dry": {"gear.bearings.guide.viscous": 0.0}},
+    )  # fmt: skip
+    square = math.sqrt(sum(1 / k**2 for k in (3, 5, 7)))
+    friction = found.select("distortion", output="gear.bearings.guide.friction").item()
+    assert friction == pytest.approx(square, rel=0.02)
+    assert found.select("distortion", output="load_angle").item() < 0.05 * square
+
+
+def test_what_stands_still_has_no_distortion():
+    found = measured(servo(sticks=True), amplitudes=[1e-3], frequencies=[1.0])
+    assert math.isnan(found.data.distortion.item())
 
 
 def test_a_cold_oil_is_a_set_of_parameters_that_damps():
@@ -357,6 +395,18 @@ def test_the_picture_has_a_line_per_amplitude_and_the_overlay():
     assert "11.5 deg" in words
     assert "multisine, 0.1 rad rms" in words
     assert overlay.plot().axes[2].get_ylabel() == "coherence"
+
+
+def test_the_picture_of_harmonics_has_a_panel_for_each_and_one_for_all():
+    found = measured(servo(sticks=True), amplitudes=[1e-3, 0.2], frequencies=[0.5, 2.0])
+    figure = found.plot_harmonics()
+    titles = [axes.get_title() for axes in figure.axes]
+    assert titles == ["harmonic 2", "harmonic 3", "harmonic 5", "all harmonics up to 7 (distortion)"]
+    third = figure.axes[1].get_lines()[3].get_ydata()  # of the second amplitude: each has a line, settled, others
+    harmonics = abs(found.select("harmonics", amplitude=0.2)).values
+    np.testing.assert_allclose(third, 100 * harmonics[:, 2] / harmonics[:, 0])
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert words == ["0.0573 deg: no motion", "11.5 deg"]
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import math
 
+import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -31,6 +32,14 @@ def test_limit_and_dead_zone_share_the_value(value, limit):
 def test_direction_is_a_sign_with_slopes_behind_its_dead_band(value, expected):
     assert direction(value, 0.1, 0.4) == pytest.approx(expected)
     assert in_symbols(direction, value, 0.1, 0.4) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("band", "slope"), [(0.0, 1.0), (0.1, 0.0)])
+def test_at_rest_a_dead_zone_has_the_slope_of_its_middle(band, slope):
+    # at a band of zero both of its edges are there, where a slope may be anything in between
+    value = ca.SX.sym("value")
+    found = ca.Function("slope", [value], [ca.jacobian(dead_zone(value, band), value)])
+    assert float(found(0.0)) == slope
 
 
 # -- feed-forward -------------------------------------------------------------------------------------

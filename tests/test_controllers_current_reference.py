@@ -214,3 +214,18 @@ def test_references_and_their_slopes_are_finite_and_the_same_in_symbols(machine,
 def test_machines_that_are_none_are_refused(values, message):
     with pytest.raises(ValueError, match=message):
         CurrentReference(**{"pole_pairs": 2, "flux": 0.1, "inductance_d": 1e-3, "inductance_q": 2e-3} | values)
+
+
+@machines
+@pytest.mark.parametrize("left", [0.0, -5.0])
+def test_where_no_voltage_is_left_the_current_cancels_the_flux_but_at_standstill(machine, left):
+    limit, wanted = CURRENT[id(machine)], machine.torque(0.0, 1.0)
+    against = -min(limit, machine.flux / machine.inductance_d)
+    for speed in (100.0, -100.0):
+        assert numbers_of(machine, wanted, speed, left, limit) == pytest.approx([against, 0.0], abs=1e-2)
+    at_rest = numbers_of(machine, wanted, 0.0, left, limit)
+    assert at_rest == pytest.approx([float(part) for part in machine.least(wanted)], rel=1e-12)
+
+
+def numbers_of(machine, *asked):
+    return [float(part) for part in machine.references(*asked)]

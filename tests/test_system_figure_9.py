@@ -14,7 +14,7 @@ import pytest
 from actuator import simulate
 from actuator.simulation.compiled import compiler
 from actuator.simulation.run import STUCK
-from studies.paper import figure_9, figure_9_inputs, figure_9_start
+from studies.checks.paper import figure_9, figure_9_inputs, figure_9_start
 
 DURATION = 10.0
 MESH = "gear.meshes.mesh"

@@ -19,7 +19,7 @@ from actuator.simulation.run import contact_labels
 from actuator.simulation.signals import piece_at
 from controllers import PID
 from gear import Bearing, Shaft, Transmission
-from studies.paper import figure_9, figure_9_inputs, figure_9_start
+from studies.checks.paper import figure_9, figure_9_inputs, figure_9_start
 
 
 class Second(NamedTuple):

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 from actuator.actuator import Actuator
 from actuator.hunting.continuation import BOUND, Branch, End, follow
 from actuator.hunting.decide import decide
+from actuator.hunting.find_orbit import find_orbit
 from actuator.hunting.flow_map import NoOrbit
-from actuator.hunting.orbit import find_orbit
 from actuator.hunting.sampled_boundary import SampledBranch, follow_sampled
 from actuator.hunting.verdict import DIVERGING, REST, Hunting
 from actuator.hybrid import HybridSystem

@@ -21,8 +21,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from actuator.hunting.find_orbit import CLOSED, FINISHED, GROWN, find_return, finished, one_period
 from actuator.hunting.flow_map import NoOrbit, Passage, Segment
-from actuator.hunting.orbit import CLOSED, FINISHED, GROWN, Orbit, find_return, finished, one_period
+from actuator.hunting.orbit import Orbit
 from actuator.hunting.sampled_orbit import SampledOrbit
 from actuator.parameters import require_known
 from actuator.simulation.run import STUCK, contact_labels

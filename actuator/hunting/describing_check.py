@@ -27,7 +27,8 @@ from actuator.hunting.describing import (
 from actuator.hunting.orbit import Orbit
 from actuator.hunting.sampled_orbit import SampledOrbit
 from actuator.linear.model import linearize
-from actuator.linear.trim import OperatingPoint, trim
+from actuator.linear.operating_point import OperatingPoint
+from actuator.linear.trim import trim
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

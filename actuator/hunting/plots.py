@@ -24,6 +24,7 @@ VERDICT_COLORS = {
 }
 GIVES, TAKES = "#c0392b", "#3b75af"
 ROW = 0.32  # inch per bar
+ROOM = 0.4  # of the longest bar, for the words behind it
 
 
 def plot_energy(energy: "CycleEnergy") -> Figure:
@@ -80,9 +81,12 @@ def plot_remedies(table: "RemedyTable") -> Figure:
         ("stiction factor", [row.stiction_factor for row in rows]),
     )
     for axes, (label, values) in zip(panels, columns, strict=True):
-        axes.barh(range(len(rows)), np.nan_to_num(values), color=colors)
+        bars = axes.barh(range(len(rows)), np.nan_to_num(values), color=colors)
         axes.set_xlabel(label)
         axes.grid(axis="x", alpha=0.3)
+        if axes is panels[0]:  # a row without a bar has no error, or no verdict
+            axes.bar_label(bars, [row.does for row in rows], padding=3, fontsize="small")
+            axes.set_xlim(0, (1 + ROOM) * max(np.nan_to_num(values)) or 1.0)
     panels[0].set_yticks(range(len(rows)), [f"{row.name} {row.setting}".strip() for row in rows])
     panels[0].invert_yaxis()
     seen = [verdict for verdict, color in VERDICT_COLORS.items() if color in colors]

@@ -31,10 +31,12 @@ from actuator.hunting.trace import stuck_fraction
 from actuator.hunting.verdict import classify
 from actuator.hybrid import HybridSystem
 from actuator.simulation.compiled import compile_function
+from actuator.simulation.input_form import InputForm
+from actuator.simulation.mode_code import ModeCode
 from actuator.simulation.run import STUCK, ModeChange, Run
 from actuator.simulation.signals import Piece
 from actuator.simulation.simulate import simulate
-from actuator.simulation.window import VIOLATION, InputForm, ModeCode, ticks_function
+from actuator.simulation.window import VIOLATION, ticks_function
 
 TOLERANCE = 1e-11  # local error of each state over its nominal size
 CHUNK, STRIDE = 200, 20  # ticks run at once, and between two points at which margins are checked

@@ -11,7 +11,7 @@ from scipy.linalg import expm, expm_frechet
 
 from actuator.hybrid import HybridSystem
 from actuator.linear.jacobians import require_smooth
-from actuator.linear.trim import OperatingPoint
+from actuator.linear.operating_point import OperatingPoint
 from actuator.parameters import require_known
 
 

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 
 from actuator.hybrid import HybridSystem
-from actuator.linear.trim import OperatingPoint
+from actuator.linear.operating_point import OperatingPoint
 
 STEPPED = ("resolution", "noise")  # fields of a sensor that make steps of its readings
 

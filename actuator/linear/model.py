@@ -10,10 +10,12 @@ from actuator.hybrid import HybridSystem
 from actuator.ledger import PREFIX
 from actuator.linear.jacobians import jacobians, require_smooth
 from actuator.linear.locked import unlocked
+from actuator.linear.operating_point import NoEquilibrium, OperatingPoint
 from actuator.linear.sampled import lifted
-from actuator.linear.trim import NoEquilibrium, OperatingPoint, rounding
+from actuator.linear.trim import rounding
 from actuator.parameters import require_known
 
+CANCELED = 8 * np.finfo(float).eps  # part that is left by rounding of what the opened loop had fed back
 RESIDUAL = 1e-5  # rate of a state over its nominal size [1/s]
 
 
@@ -151,6 +153,8 @@ def loop_transfer(
     In sampled control the signals are held, and L is exact in discrete time with the period of the slowest clock. A
     signal that is renewed N times in that period is cut N times in it: L has N inputs and outputs.
 
+    It is a model that python-control's tools take. Those that make polynomials of it, for root loci, need `reduced`.
+
     Parameters
     ----------
     point : OperatingPoint
@@ -172,7 +176,7 @@ def loop_transfer(
         matrices, step = (closed.A, closed.B, closed.C, closed.D), 0.0
         return _cut(matrices, closed.state_labels, [at], step)
     _require_still(point, drifting)
-    every = _renewed(system, at)
+    every = ticks_between(system, at)
     selected = _select(system, [PREFIX + at], [at])
     matrices = lifted(point, selected.columns, selected.rows, every)
     parts = system.hyperperiod // every
@@ -192,8 +196,11 @@ def _cut(closed: tuple[Any, ...], states: Sequence[str], channels: Sequence[str]
     """The loop of a closed one: used = computed + d. Cut, d = used - computed, so d = (1 + D)^-1 (used - C x)."""
     a, b, c, d = closed
     through = np.linalg.inv(np.eye(len(d)) + d)
+    back = b @ through @ c
+    opened = a - back
+    opened[abs(opened) <= CANCELED * (abs(a) + abs(back))] = 0  # an integrator is one, not a pole at 1e-9 1/s
     return control.StateSpace(
-        a - b @ through @ c,
+        opened,
         b @ through,
         -through @ c,
         -through @ d,
@@ -205,7 +212,7 @@ def _cut(closed: tuple[Any, ...], states: Sequence[str], channels: Sequence[str]
     )
 
 
-def _renewed(system: HybridSystem, at: str) -> int:
+def ticks_between(system: HybridSystem, at: str) -> int:
     """Ticks between two values of a held signal."""
     assert system.tick is not None
     names = [quantity.name for quantity in system.states]
@@ -216,49 +223,3 @@ def _renewed(system: HybridSystem, at: str) -> int:
     by_due = system.tick.jac_sparsity(0, 0)
     row = names.index(f"controller.{at}")
     return min(system.clocks[k].every for i, k in zip(by_due.row(), by_due.get_col(), strict=True) if i == row)
-
-
-def sensitivity(point: OperatingPoint, at: str, *, drifting: Sequence[str] = ()) -> control.StateSpace:
-    """S = 1/(1 + L) of the loop at a named signal: the signal as used over what is added to it.
-
-    Parameters as for `loop_transfer`, and as many inputs and outputs.
-    """
-    loop = loop_transfer(point, at, drifting=drifting)
-    return _feedback(loop, np.eye(loop.ninputs), 1.0, "used")
-
-
-def complementary_sensitivity(point: OperatingPoint, at: str, *, drifting: Sequence[str] = ()) -> control.StateSpace:
-    """T = L/(1 + L) = 1 - S of the loop at a named signal.
-
-    Parameters as for `loop_transfer`.
-    """
-    loop = loop_transfer(point, at, drifting=drifting)
-    return _feedback(loop, np.zeros((loop.ninputs,) * 2), -1.0, "complementary")
-
-
-def _feedback(loop: control.StateSpace, direct: np.ndarray, sign: float, word: str) -> control.StateSpace:
-    """`direct` - `sign` L/(1 + L)."""
-    a, b, c, d = loop.A, loop.B, loop.C, loop.D
-    through = np.linalg.inv(np.eye(len(d)) + d)
-    return control.StateSpace(
-        a - b @ through @ c,
-        b @ through,
-        -sign * through @ c,
-        direct - sign * through @ d,
-        loop.dt,
-        states=loop.state_labels,
-        inputs=loop.input_labels,
-        outputs=[f"{name}_{word}" for name in loop.input_labels],
-        remove_useless_states=False,
-    )
-
-
-def load_response(
-    point: OperatingPoint, outputs: Sequence[str] = ("load_angle",), *, drifting: Sequence[str] = ()
-) -> control.StateSpace:
-    """Response of outputs to a torque on the output shaft, all loops closed: for the load angle, the compliance.
-
-    Parameters as for `linearize`; in sampled control the torque is constant over a period, and `harmonic_response` has
-    the one to sines.
-    """
-    return linearize(point, ["load_torque"], outputs, drifting=drifting)

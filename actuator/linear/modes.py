@@ -12,8 +12,9 @@ from actuator.actuator import Actuator
 from actuator.hybrid import HybridSystem
 from actuator.linear.loop_margins import CUT, SLOW, Margins, margins
 from actuator.linear.model import linearize, loop_transfer
+from actuator.linear.operating_point import MOTIONS, NoEquilibrium, OperatingPoint
 from actuator.linear.sampled import without_counts
-from actuator.linear.trim import MOTIONS, NoEquilibrium, OperatingPoint, trim
+from actuator.linear.trim import trim
 from actuator.parameters import require_known
 from actuator.simulation.run import FREE, STUCK, contact_labels, contact_names
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.linalg import eig
 
 from actuator.linear.model import linearize
-from actuator.linear.trim import OperatingPoint
+from actuator.linear.operating_point import OperatingPoint
 
 if TYPE_CHECKING:
     import xarray

@@ -13,7 +13,7 @@ from scipy.linalg import expm
 
 from actuator.actuator import Actuator
 from actuator.linear.jacobians import jacobians, require_smooth, tick_jacobians
-from actuator.linear.trim import OperatingPoint
+from actuator.linear.operating_point import OperatingPoint
 from actuator.parameters import require_known
 from actuator.parts.sensors import AngleSensor, CurrentSensor
 

@@ -1,8 +1,7 @@
-"""Operating points: states at which nothing changes, in a chosen contact mode."""
+"""The search for operating points: states at which nothing changes, in a chosen contact mode."""
 
 import contextlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 
 import casadi as ca
@@ -10,98 +9,22 @@ import numpy as np
 
 from actuator.actuator import Actuator
 from actuator.hybrid import HybridSystem
+from actuator.linear.locked import eliminated, slips
+from actuator.linear.operating_point import STOPS, NoEquilibrium, OperatingPoint, modes_of, usual_flank
 from actuator.parameters import require_known
-from actuator.simulation.run import contact_labels, contact_names
+from actuator.simulation.run import contact_labels
 
-MOTIONS = {"stuck": 0, "forward": 1, "backward": -1}
 STEPS = 60  # Newton steps; the equations of a mode are nearly linear
+POLISH = 3  # more of them once the residual is small, as long as it falls
+SETTLING = 1e-5 * 2.0 ** np.arange(34)  # s, up to a day
 STILL = 1e-9  # rate of a state over its nominal size [1/s] that counts as zero
 ROUNDING, MOST_ROUNDING = 100 * np.finfo(float).eps, 1e-2
+SLOWEST = 1e-6  # rate [1/s] of a row that still counts in full: of what no state moves, rounding would count for all
 HOLDS = -1e-6  # a margin below this does not hold
-STOPS = "gear.stops."  # what the flanks of end stops are called
-
-
-class NoEquilibrium(ValueError):
-    """No operating point; `rates` are the rates of the states where the search ended, by name."""
-
-    def __init__(self, message: str, rates: dict[str, float]) -> None:
-        super().__init__(message)
-        self.rates = rates
-
-
-@dataclass(frozen=True, kw_only=True)
-class OperatingPoint:
-    """A state of rest, or of steady motion, of a system in one combination of contact modes.
-
-    Attributes
-    ----------
-    system : HybridSystem
-        To which it belongs.
-    x, m, u, p : ndarray
-        State, modes, inputs, parameters.
-    rates : ndarray
-        dx/dt; zero but for the states that were allowed to drift. Of what a clock holds, the change at a tick over
-        the period.
-    """
-
-    system: HybridSystem
-    x: np.ndarray
-    m: np.ndarray
-    u: np.ndarray
-    p: np.ndarray
-    rates: np.ndarray
-
-    @property
-    def states(self) -> dict[str, float]:
-        """States by name."""
-        return {quantity.name: float(value) for quantity, value in zip(self.system.states, self.x, strict=True)}
-
-    @property
-    def flanks(self) -> dict[str, int]:
-        """Flank of each mesh, coupling and end stop that has one, by name."""
-        named = zip(self.system.modes, self.m, strict=True)
-        return {name.removesuffix(".flank"): int(mode) for name, mode in named if name.endswith(".flank")}
-
-    @property
-    def outputs(self) -> dict[str, float]:
-        """Outputs by name."""
-        values = self.system.outputs_function(self.x, self.m, self.u, self.p).full().ravel()
-        return {quantity.name: float(value) for quantity, value in zip(self.system.outputs, values, strict=True)}
-
-
-def modes_of(
-    system: HybridSystem, contacts: str | Mapping[str, str], flanks: Mapping[str, int] | None = None
-) -> np.ndarray:
-    """Mode vector from words.
-
-    One word for all contacts is about the output: "stuck", or all contacts sliding as they do when the output
-    moves "forward" or "backward" (some of them backward, then). Words per contact are about its own slip
-    speed. Flanks that are not given are +1, those of end stops 0.
-    """
-    names = contact_names(system.modes)
-    if isinstance(contacts, str):
-        require_known([contacts], MOTIONS, "contact mode")
-        values = {f"{name}.motion": MOTIONS[contacts] * system.travel[name] for name in names}
-    else:
-        require_known(contacts, names, "contact")
-        require_known(contacts.values(), MOTIONS, "contact mode")
-        missing = [name for name in names if name not in contacts]
-        if missing:
-            raise KeyError(f"no mode given for contact {', '.join(missing)}; each needs stuck, forward or backward")
-        values = {f"{name}.motion": MOTIONS[word] for name, word in contacts.items()}
-    flank_names = [name for name in system.modes if name.endswith(".flank")]
-    given = {f"{name}.flank": value for name, value in (flanks or {}).items()}
-    require_known(given, flank_names, "flank")
-    return system.mode_vector(values | {name: given.get(name, _usual_flank(name)) for name in flank_names})
-
-
-def _usual_flank(name: str) -> int:
-    """Teeth and couplings transmit; an end stop is not touched."""
-    return 0 if name.startswith(STOPS) else 1
 
 
 def _turned(margins: Mapping[str, float], flanks: Mapping[str, int]) -> dict[str, int]:
-    """The other flank where the present one does not hold; of an end stop, the one that was passed or none."""
+    """The other flank where the present one does not hold; from a gap, the one that was passed or none."""
     found = {}
     for name, flank in flanks.items():
         broken = [side for side, sign in ((1, "+"), (-1, "-")) if margins.get(f"{name} flank {sign}", 0.0) < 0]
@@ -112,6 +35,13 @@ def _turned(margins: Mapping[str, float], flanks: Mapping[str, int]) -> dict[str
         else:
             found[name] = flank
     return found
+
+
+def _freed(margins: Mapping[str, float], flanks: Mapping[str, int], found: Mapping[str, int]) -> dict[str, int]:
+    """What has a gap stands in it, where it is pushed off one flank and off the other."""
+    return {
+        name: 0 if flank != flanks[name] and f"{name} flank +" in margins else flank for name, flank in found.items()
+    }
 
 
 def trim(  # noqa: PLR0913 - what may be held and where to start are all choices of the user
@@ -128,7 +58,8 @@ def trim(  # noqa: PLR0913 - what may be held and where to start are all choices
     In a sliding mode at speed zero, friction acts with its full sliding value in that direction: the limit
     from which the contact starts, or to which it comes. In a stuck mode many points are at rest; the one
     nearest to the guess is taken, or where no guess is given the one that forward motion leaves behind.
-    Flanks follow from the load; for a point of rest against an end stop, give a guess beyond it.
+    Flanks follow from the load, and teeth that neither flank would hold stand in their gap, free; for a point of rest
+    against an end stop, give a guess beyond it.
 
     Parameters
     ----------
@@ -163,18 +94,21 @@ def trim(  # noqa: PLR0913 - what may be held and where to start are all choices
     scale = np.array([quantity.nominal for quantity in system.states])
     free = np.array([name not in drifting for name in names])
     flank_names = [name.removesuffix(".flank") for name in system.modes if name.endswith(".flank")]
-    usual = {name: _usual_flank(name) for name in flank_names}
+    usual = {name: usual_flank(name) for name in flank_names}
     at_guess = system.margins(x, modes_of(system, contacts, usual), u, p).full().ravel()
     stops = {name: 0 for name in flank_names if name.startswith(STOPS)}
     flanks = usual | _turned(dict(zip(system.margin_names, at_guess, strict=True)), stops) | flanks
-    for _ in range(2 + len(flanks)):
+    tried = []
+    for _ in range(2 + 2 * len(flanks)):
         m = modes_of(system, contacts, flanks)
         x, rates = _newton(system, x, m, u, p, scale, free)
         margins = system.margins(x, m, u, p).full().ravel()
-        found = _turned(dict(zip(system.margin_names, margins, strict=True)), flanks)
+        named = dict(zip(system.margin_names, margins, strict=True))
+        found = _turned(named, flanks)
         if found == flanks:
             break
-        flanks = found
+        tried.append(flanks)
+        flanks = _freed(named, flanks, found) if found in tried else found
     if margins.size and margins.min() < HOLDS:
         m, held = _held_by_others(system, x, m, u, p)
         margins = np.zeros(1) if held else margins
@@ -206,29 +140,62 @@ def _newton(
     scale: np.ndarray,
     free: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Least-norm Newton steps, in states over their nominal sizes, damped until the residual falls."""
+    """Least-norm Newton steps, in states over their nominal sizes, damped until the residual falls.
+
+    Where they do not arrive, as a limit has no slope that leads back, they go on from where time would lead.
+    """
     flow, jacobian = rates_function(system), _jacobian(system)
-    drifts = ~free  # a drifting state may have any constant rate
+    # what stuck contacts lock is no unknown: the balance of its torques holds whatever they are, but for rounding
+    start = OperatingPoint(system=system, x=x, m=m, u=u, p=p, rates=np.zeros_like(x))
+    expressed, kept = eliminated([row * scale for row in slips(start)], len(x))
+    x = scale * (expressed @ (x / scale)[kept])
+    unknown = np.flatnonzero(free[kept])  # a drifting state may have any constant rate
+    equations, moves = np.array(kept)[unknown], expressed[:, unknown]
 
     def residual(state: np.ndarray) -> np.ndarray:
-        return np.where(drifts, 0.0, flow(state, m, u, p).full().ravel() / scale)
+        return (flow(state, m, u, p).full().ravel() / scale)[equations]
 
-    rate = residual(x)
-    for _ in range(STEPS):
-        if (abs(rate) < STILL).all():
-            break
-        matrix = jacobian(x, m, u, p).full() / scale[:, None] * scale[None, :]
-        rows = 1 / np.maximum(np.linalg.norm(matrix, axis=1), 1e-12)  # stiff rows would drown the others
-        step = np.zeros_like(x)
-        step[free] = np.linalg.lstsq((rows[:, None] * matrix)[free][:, free], -(rows * rate)[free], rcond=1e-13)[0]
-        for damping in (1.0, 0.5, 0.1, 0.01):
-            trial = residual(x + damping * scale * step)
-            if np.linalg.norm(rows * trial) < np.linalg.norm(rows * rate):
+    def slopes(state: np.ndarray) -> np.ndarray:
+        return (jacobian(state, m, u, p).full() / scale[:, None] * scale[None, :])[equations] @ moves
+
+    def found(state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        rates = scale * (expressed @ (flow(state, m, u, p).full().ravel() / scale)[kept])
+        return rates, abs(np.where(free, rates / scale, 0.0))
+
+    def steps(state: np.ndarray) -> np.ndarray:
+        rate, polished = residual(state), 0
+        for _ in range(STEPS):
+            polished += bool((abs(rate) <= rounding(system, state, m, u, p)[equations]).all())
+            if polished > POLISH:
                 break
-        x, rate = x + damping * scale * step, trial
-    rates = flow(x, m, u, p).full().ravel()
-    worst = np.argsort(-abs(rate))[:3]
-    if (abs(rate) > rounding(system, x, m, u, p)).any():
+            matrix = slopes(state)
+            rows = 1 / np.maximum(np.linalg.norm(matrix, axis=1), SLOWEST)  # stiff rows would drown the others
+            step = scale * (moves @ np.linalg.lstsq(rows[:, None] * matrix, -rows * rate, rcond=1e-13)[0])
+            for damping in (1.0, 0.5, 0.1, 0.01):
+                trial = residual(state + damping * step)
+                if np.linalg.norm(rows * trial) < np.linalg.norm(rows * rate):
+                    break
+            else:
+                if polished:
+                    break
+            state, rate = state + damping * step, trial
+        return state
+
+    def settled(state: np.ndarray) -> np.ndarray:
+        """After steps of implicit Euler, each twice as long as the one before."""
+        for duration in SETTLING:
+            change = np.linalg.solve(np.eye(len(equations)) / duration - slopes(state), residual(state))
+            state = state + scale * (moves @ change)
+        return state
+
+    arrived = steps(x)
+    rates, left = found(arrived)
+    if (left > rounding(system, arrived, m, u, p)).any():
+        with contextlib.suppress(np.linalg.LinAlgError):  # nowhere, where time leads to infinity
+            later = steps(settled(x))
+            if (found(later)[1] <= rounding(system, later, m, u, p)).all():
+                return later, found(later)[0]
+        worst = np.argsort(-left)[:3]
         named = dict(zip([quantity.name for quantity in system.states], rates, strict=True))
         text = ", ".join(f"d({system.states[i].name})/dt = {rates[i]:.4g} {system.states[i].unit}/s" for i in worst)
         raise NoEquilibrium(
@@ -236,7 +203,7 @@ def _newton(
             "Check the load against the torque and voltage limits, or let states that move steadily drift",
             named,
         )
-    return x, rates
+    return arrived, rates
 
 
 def rounding(system: HybridSystem, x: np.ndarray, m: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:

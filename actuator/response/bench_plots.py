@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.figure import Figure
-from matplotlib.ticker import MultipleLocator
+from matplotlib.ticker import MaxNLocator, MultipleLocator
 
+from actuator.response.response_plots import plain_hertz
 from actuator.simulation.plots import DEGREES
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ def plot_stiffness(found: "DynamicStiffness", **where: Any) -> Figure:
             axes.plot(hertz[settled], row[settled], "o", color=color, markersize=3)
             axes.plot(hertz[~settled], row[~settled], "o", color=color, markersize=4, mfc="w")
     size.set(xscale="log", yscale="log", ylabel="stiffness in N m/rad")
+    plain_hertz(phase)
     phase.set(ylabel="phase in deg", xlabel="frequency in Hz")
     phase.yaxis.set_major_locator(MultipleLocator(45))
     for axes in (size, phase):
@@ -100,11 +102,11 @@ def plot_back_driving(found: "BackDriving") -> Figure:
 
 def plot_steps(test: "StepTest") -> Figure:
     """All steps over their sizes, with the band in which they have settled."""
-    figure = Figure(figsize=(9, 4.5), layout="constrained")
+    figure = Figure(figsize=(9, 5), layout="constrained")
     axes = figure.subplots()
     for step in test.steps:
         run = step.run
-        moved = (run["load_angle"] - run["load_angle"][0]) / step.size_rad
+        moved = 1 + (run["load_angle"] - run["reference"][-1]) / step.size_rad
         label = (
             f"{DEGREES * step.size_rad:.3g} deg: overshoot {step.overshoot:.0%}, rise {1e3 * step.rise_s:.0f} ms, "
             f"settled {_seconds(step.settling_s)}"
@@ -112,9 +114,9 @@ def plot_steps(test: "StepTest") -> Figure:
         axes.plot(run.t, moved, linewidth=1.2, label=label)
     axes.axhspan(0.98, 1.02, color="#e8e8e8", label="2 % of the step")
     axes.set_xlabel("time in s")
-    axes.set_ylabel("load angle over step")
+    axes.set_ylabel("load angle over step, from the old reference")
     axes.grid(alpha=0.3)
-    axes.legend(fontsize="small", loc="lower right")
+    figure.legend(loc="outside lower center", ncols=2, fontsize="small", frameon=False)
     return figure
 
 
@@ -136,6 +138,7 @@ def plot_triangle(test: "TriangleTest") -> Figure:
     right.set(xlabel="motor angle at the load in deg", ylabel="load behind motor in arcmin")
     right.set_title(f"lost motion {ARCMIN * test.lost_motion_rad:.3g} arcmin", fontsize="medium")
     for axes in (left, right):
+        axes.xaxis.set_major_locator(MaxNLocator(5))
         axes.grid(alpha=0.3)
     return figure
 
@@ -177,21 +180,25 @@ def plot_rate(test: "RateTest") -> Figure:
 
 
 def plot_soak(test: "SoakTest") -> Figure:
-    """Steps of all temperatures, and the position error while holding."""
+    """Steps at all temperatures, and the position error while holding."""
     figure = Figure(figsize=(9, 6), layout="constrained")
     upper, lower = figure.subplots(2, 1)
-    colors = colormaps["coolwarm"](np.linspace(0, 1, len(test.points)))
+    colors = colormaps["plasma"](np.linspace(0, 0.8, len(test.points)))
     for point, color in zip(test.points, colors, strict=True):
         upper.plot(
-            point.step.run.t, DEGREES * point.step.run["load_angle"], color=color, linewidth=1.2, label=point.name
+            point.step.run.t,
+            DEGREES * point.step.run["load_angle"],
+            color=color,
+            linewidth=1.2,
+            label=f"{point.name}: {point.hold.verdict.verdict}",
         )
         run = point.hold.run
-        lower.plot(run.t, DEGREES * run["position_error"], color=color, linewidth=1.0, label=point.hold.verdict.verdict)
-    upper.set_ylabel("load angle in deg")
-    largest = max(float(abs(p.hold.run["position_error"][p.hold.run.t > 1].max())) for p in test.points)
-    lower.set_ylim(-2 * DEGREES * largest, 2 * DEGREES * largest)
+        lower.plot(run.t, DEGREES * run["position_error"], color=color, linewidth=1.0)
+    upper.set(xlabel="time in s", ylabel="load angle in deg")
+    largest = max(float(abs(p.hold.run["position_error"][p.hold.run.t > 1]).max()) for p in test.points)
+    lower.set_ylim(-1.2 * DEGREES * largest, 1.2 * DEGREES * largest)
     lower.set(xlabel="time in s", ylabel="position error in deg")
     for axes in (upper, lower):
         axes.grid(alpha=0.3)
-        axes.legend(fontsize="small")
+    figure.legend(loc="outside lower center", ncols=3, fontsize="small", frameon=False)
     return figure

@@ -32,8 +32,8 @@ class FrequencyResponse:
     ----------
     data : xarray.Dataset
         Over set, load [N m], amplitude, frequency [Hz] and output: `response` (complex, the fundamental of the output
-        over the sine), `harmonics` (complex, of the output), `mean`, `peak_to_peak`; without output: `settled`,
-        `moves`, `slides`, `stuck`, `periods`, `note`.
+        over the sine), `harmonics` (complex, of the output), `distortion` (all harmonics over the fundamental, of what
+        moves), `mean`, `peak_to_peak`; without output: `settled`, `moves`, `slides`, `stuck`, `periods`, `note`.
     given : str
         The input of the sine.
     """
@@ -84,6 +84,12 @@ class FrequencyResponse:
         from actuator.response.response_plots import plot_responses
 
         return plot_responses(self, linear, overlay, **where)
+
+    def plot_harmonics(self, **where: Any) -> "Figure":
+        """Harmonics over the fundamental, a line per amplitude; `where` as for `plot`."""
+        from actuator.response.response_plots import plot_harmonics
+
+        return plot_harmonics(self, **where)
 
 
 def frequency_response(  # noqa: PLR0913 - an experiment has this many choices, all but three with defaults
@@ -226,11 +232,15 @@ def _dataset(
     def table(name: str) -> np.ndarray:
         return np.array([getattr(place, name) for place in places]).reshape(shape)
 
+    heights = abs(amplitudes[..., 1:])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distortion = np.linalg.norm(heights[..., 1:], axis=-1) / heights[..., 0]
     return xarray.Dataset(
         {
             "response": (full, amplitudes[..., 1] / sizes, {"units": f"({seen_unit})/({units[stream.given]})"}),
             "mean": (full, np.real(amplitudes[..., 0]), {"units": seen_unit}),
             "harmonics": ((*full, "harmonic"), amplitudes[..., 1:], {"units": seen_unit}),
+            "distortion": (full, np.where(table("moves")[..., None], distortion, np.nan), {"units": "-"}),
             "peak_to_peak": (
                 full,
                 np.array([place.peak_to_peak for place in places]).reshape(*shape, outputs),

@@ -7,7 +7,8 @@ import numpy as np
 from actuator.actuator import Actuator
 from actuator.hybrid import HybridSystem
 from actuator.linear.model import linearize
-from actuator.linear.trim import NoEquilibrium, OperatingPoint, trim
+from actuator.linear.operating_point import NoEquilibrium, OperatingPoint
+from actuator.linear.trim import trim
 
 SLOWEST = 1e-6  # part of the fastest pole below which a pole never decays
 

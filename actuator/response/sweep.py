@@ -1,10 +1,11 @@
 """Many points of one kind: in parallel, with progress, and without repeating those that are done."""
 
-import multiprocessing
 import os
 from collections.abc import Callable, Mapping, MutableMapping
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from typing import Any
+
+from actuator.response.processes import processes
 
 _work: Callable[[Any], dict[str, Any]] | None = None
 
@@ -53,16 +54,10 @@ def sweep(
         for key, point in missing.items():
             note(key, work(point))
     else:
-        # a fresh interpreter: a copy of this one would hold its threads' locks
-        fresh = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(workers, fresh, _equip, (work,)) as pool:
+        with processes(workers, _equip, work) as pool:
             futures = {pool.submit(_call, point): key for key, point in missing.items()}
-            try:
-                for future in as_completed(futures):
-                    note(futures[future], future.result())
-            except BaseException:
-                pool.shutdown(cancel_futures=True)
-                raise
+            for future in as_completed(futures):
+                note(futures[future], future.result())
     return {key: done[key] for key in points}
 
 

@@ -23,16 +23,10 @@ import numpy as np
 
 from actuator.hybrid import HybridSystem
 from actuator.simulation.compiled import compile_function
+from actuator.simulation.input_form import InputForm
+from actuator.simulation.mode_code import LOG_SLOTS, ModeCode
 from actuator.simulation.signals import Piece
-from actuator.simulation.window import (
-    INTERVALS,
-    LOG_SLOTS,
-    VIOLATION,
-    InputForm,
-    ModeCode,
-    ticks_function,
-    window_function,
-)
+from actuator.simulation.window import INTERVALS, VIOLATION, ticks_function, window_function
 
 FINEST_WINDOW = 1e-7  # s; a window that fails at this length is a failure of the model
 ON_TIME = 1e-9  # part of a period within which an instant is that of a tick

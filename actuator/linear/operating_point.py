@@ -1,0 +1,98 @@
+"""Operating points: a state in which nothing changes, the contact modes it is in, and what they are called."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuator.hybrid import HybridSystem
+from actuator.parameters import require_known
+from actuator.simulation.run import contact_names
+
+MOTIONS = {"stuck": 0, "forward": 1, "backward": -1}
+STOPS = "gear.stops."  # what the flanks of end stops are called
+
+
+class NoEquilibrium(ValueError):
+    """No operating point; `rates` are the rates of the states where the search ended, by name."""
+
+    def __init__(self, message: str, rates: dict[str, float]) -> None:
+        super().__init__(message)
+        self.rates = rates
+
+
+@dataclass(frozen=True, kw_only=True)
+class OperatingPoint:
+    """A state of rest, or of steady motion, of a system in one combination of contact modes.
+
+    Attributes
+    ----------
+    system : HybridSystem
+        To which it belongs.
+    x, m, u, p : ndarray
+        State, modes, inputs, parameters.
+    rates : ndarray
+        dx/dt; zero but for the states that were allowed to drift. Of what a clock holds, the change at a tick over
+        the period.
+    """
+
+    system: HybridSystem
+    x: np.ndarray
+    m: np.ndarray
+    u: np.ndarray
+    p: np.ndarray
+    rates: np.ndarray
+
+    @property
+    def states(self) -> dict[str, float]:
+        """States by name."""
+        return {quantity.name: float(value) for quantity, value in zip(self.system.states, self.x, strict=True)}
+
+    @property
+    def flanks(self) -> dict[str, int]:
+        """Flank of each mesh, coupling and end stop that has one, by name."""
+        named = zip(self.system.modes, self.m, strict=True)
+        return {name.removesuffix(".flank"): int(mode) for name, mode in named if name.endswith(".flank")}
+
+    @property
+    def outputs(self) -> dict[str, float]:
+        """Outputs by name."""
+        values = self.system.outputs_function(self.x, self.m, self.u, self.p).full().ravel()
+        return {quantity.name: float(value) for quantity, value in zip(self.system.outputs, values, strict=True)}
+
+
+def modes_of(
+    system: HybridSystem, contacts: str | Mapping[str, str], flanks: Mapping[str, int] | None = None
+) -> np.ndarray:
+    """Mode vector from words.
+
+    One word for all contacts is about the output: "stuck", or all contacts sliding as they do when the output
+    moves "forward" or "backward" (some of them backward, then). Words per contact are about its own slip
+    speed. Flanks that are not given are +1, those of end stops 0; a contact on no flank is free, whatever its word.
+    """
+    names = contact_names(system.modes)
+    if isinstance(contacts, str):
+        require_known([contacts], MOTIONS, "contact mode")
+        values = {f"{name}.motion": MOTIONS[contacts] * system.travel[name] for name in names}
+    else:
+        require_known(contacts, names, "contact")
+        require_known(contacts.values(), MOTIONS, "contact mode")
+        missing = [name for name in names if name not in contacts]
+        if missing:
+            raise KeyError(f"no mode given for contact {', '.join(missing)}; each needs stuck, forward or backward")
+        values = {f"{name}.motion": MOTIONS[word] for name, word in contacts.items()}
+    flank_names = [name for name in system.modes if name.endswith(".flank")]
+    given = {f"{name}.flank": value for name, value in (flanks or {}).items()}
+    require_known(given, flank_names, "flank")
+    values |= {name: given.get(name, usual_flank(name)) for name in flank_names}
+    free = {name: 0 for name in values if name.endswith(".motion") and values.get(_flank_of(name)) == 0}
+    return system.mode_vector(values | free)
+
+
+def _flank_of(motion: str) -> str:
+    return motion.removesuffix(".motion") + ".flank"
+
+
+def usual_flank(name: str) -> int:
+    """Teeth and couplings transmit; an end stop is not touched."""
+    return 0 if name.startswith(STOPS) else 1

@@ -1,13 +1,15 @@
 """Judge one case: simulate it, say whether it hunts, and linearize it in every contact mode."""
 
 import contextlib
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, get_type_hints
 
 import control
 
 from actuator import (
-    Actuator,
     Hunting,
     Margins,
     NoEquilibrium,
@@ -25,20 +27,25 @@ from actuator import (
     without_counts,
 )
 from actuator.hunting.causes import Causes, find_causes
+from actuator.hunting.flow_map import flow_map
 from actuator.hunting.margins import ENDINGS, HuntingMargin, hunting_margin
-from actuator.hunting.remedies import RemedySearch, RemedyTable
+from actuator.hunting.remedies import Remedy, RemedySearch, RemedyTable
 from actuator.hunting.sampled_orbit import SampledOrbit, find_sampled_orbit
 from actuator.hunting.verdict import DIVERGING
 from actuator.ledger import PREFIX
+from actuator.response.processes import processes
 from actuator.simulation.signals import piece_at
 from studies.cases import Case
-from studies.processes import processes
+from studies.kept import model_of
+from studies.stages import CONVERTER, KeepingExecutor, Missing, Stages
 
 MODES = ("stuck", "forward", "backward")
 RESOLUTION = 2e-3  # s
-PATIENCE = 3.0  # s that a run may take where a hundred of them follow
+PATIENCE = 1.5  # s of computing that a run may take where a hundred of them follow
 SIMULATED, MODELED = 0.05, 0.1  # shares of the work when the run and the linear models are done
 ORBIT, MARGINS, CAUSES = 0.3, 0.6, 0.8  # of what follows, when these are done
+BUILT = ("system", "map")  # of an orbit; all else of it is numbers
+MOST_TICKS = 3000  # of a period through which derivatives are taken, again and again
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,80 +109,154 @@ class Judgment:
     insight: Insight
 
 
-def judge(case: Case, progress: Callable[[float], None] | None = None, *, thorough: bool = False) -> Judgment:
+def fingerprint_of(case: Case) -> str:
+    """Of all in a case that a judgment depends on."""
+    parameters = {parameter.name: float(parameter.default) for parameter in case.actuator.system().parameters}
+    return model_of(parameters, repr((case.actuator, case.inputs, case.duration)))
+
+
+def judge(
+    case: Case,
+    progress: Callable[[float], None] | None = None,
+    *,
+    thorough: bool = False,
+    stages: Stages | None = None,
+) -> Judgment:
     """Simulate, classify and linearize a case; where it hunts, say why, how far it is from rest, and what helps.
 
-    `progress` is called with the share of the work that is done, 0 to 1. Where a run takes long, what needs many of
-    them is left out unless `thorough`.
+    Parameters
+    ----------
+    case : Case
+        What is judged.
+    progress : callable or None
+        Called with the share of the work that is done, 0 to 1.
+    thorough : bool
+        Whether what needs many runs is done even where one takes long.
+    stages : Stages or None
+        Where orbit, margins, causes and remedies are kept; the run and the linear models are quickly made again.
     """
     tell = progress or (lambda share: None)
+    began = time.process_time()
     run = simulate(
         case.actuator,
         case.duration,
         inputs=case.inputs,
         resolution=RESOLUTION,
-        progress=lambda time: tell(SIMULATED * time / case.duration),
+        progress=lambda at: tell(SIMULATED * at / case.duration),
     )
+    # the first includes what else the machine did meanwhile, the second the building of the model
+    spent = min(run.statistics.wall_s, time.process_time() - began)
     hunting, models = classify(run), []
     final = {name: piece_at(signal, case.duration)(0.0) for name, signal in case.inputs.items()}
     for k, mode in enumerate(MODES):
         models.append(_model(case, mode, final))
         tell(SIMULATED + (MODELED - SIMULATED) * (k + 1) / len(MODES))
-    insight = _insight(case, run, hunting, final, lambda share: tell(MODELED + (1 - MODELED) * share), thorough)
+    if case.actuator.controller is None or not hunting.decided or hunting.verdict == DIVERGING:
+        insight = Insight()
+    elif spent > PATIENCE and not thorough:
+        why = f"a run takes {spent:.2g} s, and this takes a hundred; ask for it with --thorough"
+        insight = Insight(missing={"all": why})
+    else:
+        inside = _Inside(case, run, hunting, final, stages or Stages())
+        insight = inside.insight(lambda share: tell(MODELED + (1 - MODELED) * share))
     tell(1.0)
     return Judgment(case=case, run=run, hunting=hunting, models=tuple(models), insight=insight)
 
 
-def _insight(  # noqa: PLR0913, PLR0917 - what it is of, and how
-    case: Case,
-    run: Run,
-    hunting: Hunting,
-    final: dict[str, float],
-    tell: Callable[[float], None],
-    thorough: bool,
-) -> Insight:
-    actuator = case.actuator
-    if actuator.controller is None or not hunting.decided or hunting.verdict == DIVERGING:
-        return Insight()
-    wall = run.statistics.wall_s
-    if wall > PATIENCE and not thorough:
-        return Insight(
-            missing={"all": f"a run takes {wall:.2g} s, and this takes a hundred; ask for it with --thorough"}
-        )
-    with contextlib.ExitStack() as stack:
-        search = None
-        if hunting.cycles:
-            pool = stack.enter_context(processes(1))
-            search = RemedySearch(actuator, run, inputs=case.inputs, resolution=RESOLUTION, executor=pool)
-        missing: dict[str, str] = {}
-        orbit = _orbit(actuator, run, missing) if hunting.cycles else None
-        tell(ORBIT)
-        margins = _margins(case, final, missing)
-        tell(MARGINS)
-        causes = find_causes(actuator, run, inputs=case.inputs, resolution=RESOLUTION) if hunting.cycles else None
-        tell(CAUSES)
-        remedies = search.finish(lambda share: tell(CAUSES + (1 - CAUSES) * share)) if search else None
-    return Insight(orbit=orbit, margins=margins, causes=causes, remedies=remedies, missing=missing)
+@dataclass(frozen=True)
+class _Inside:
+    """What the insight into a case is made of."""
 
+    case: Case
+    run: Run
+    hunting: Hunting
+    final: dict[str, float]
+    stages: Stages
+    missing: dict[str, str] = field(default_factory=dict)
 
-def _orbit(actuator: Actuator, run: Run, missing: dict[str, str]) -> Orbit | SampledOrbit | None:
-    try:
-        return find_orbit(actuator, run) if actuator.sampling is None else find_sampled_orbit(actuator, run)
-    except NoOrbit as error:
-        missing["orbit"] = str(error)
-        return None
+    def insight(self, tell: Callable[[float], None]) -> Insight:
+        """All parts, the remedies in a process beside the others."""
+        with contextlib.ExitStack() as stack:
+            search = None
+            if self.hunting.cycles:
+                pool = KeepingExecutor(stack.enter_context(processes(1)), self.stages, "remedy", Remedy)
+                search = RemedySearch(self.case.actuator, self.run, **self._options(), executor=pool)
+            orbit = self.orbit() if self.hunting.cycles else None
+            tell(ORBIT)
+            margins = self.margins()
+            tell(MARGINS)
+            causes = self.causes() if self.hunting.cycles else None
+            tell(CAUSES)
+            remedies = self.remedies(search, lambda share: tell(CAUSES + (1 - CAUSES) * share)) if search else None
+        return Insight(orbit=orbit, margins=margins, causes=causes, remedies=remedies, missing=self.missing)
 
+    def orbit(self) -> Orbit | SampledOrbit | None:
+        """The exact cycle, from its numbers."""
+        actuator = self.case.actuator
+        kind, find = (Orbit, find_orbit) if actuator.sampling is None else (SampledOrbit, find_sampled_orbit)
+        hints = {name: hint for name, hint in get_type_hints(kind).items() if name not in BUILT}
 
-def _margins(case: Case, final: dict[str, float], missing: dict[str, str]) -> dict[str, HuntingMargin]:
-    found = {}
-    names = [parameter.name for parameter in case.actuator.system().parameters]
-    for kind, endings in ENDINGS.items():
-        if any(name.endswith(endings) for name in names):
+        def numbers() -> dict[str, Any]:
+            if actuator.sampling is not None:
+                self._require_short()
+            found = find(actuator, self.run)
+            return {name: CONVERTER.unstructure(getattr(found, name)) for name in hints}
+
+        try:
+            kept = self.stages.get("orbit", dict, numbers, failures=(NoOrbit,))
+        except Missing as reason:
+            self.missing["orbit"] = str(reason)
+            return None
+        values: dict[str, Any] = {name: CONVERTER.structure(kept[name], hint) for name, hint in hints.items()}
+        system = actuator.system()
+        if kind is Orbit:
+            return Orbit(system=system, map=flow_map(system), **values)
+        return SampledOrbit(system=system, **values)
+
+    def _require_short(self) -> None:
+        ticks = self.hunting.period_s / self.run.system.tick_period(self.run.parameters)
+        if ticks > MOST_TICKS:
+            raise NoOrbit(
+                f"a period has {ticks:.0f} ticks of the controller, and closing it exactly takes derivatives through "
+                f"all of them many times: hours; beyond {MOST_TICKS} it is not tried. Period and amplitude are those "
+                "of the run; actuator.hunting.sampled_orbit.find_sampled_orbit tries it"
+            )
+
+    def margins(self) -> dict[str, HuntingMargin]:
+        """Those that the actuator has parameters for."""
+        found = {}
+        names = [parameter.name for parameter in self.case.actuator.system().parameters]
+        for kind in [kind for kind, endings in ENDINGS.items() if any(name.endswith(endings) for name in names)]:
             try:
-                found[kind] = hunting_margin(case.actuator, kind, inputs=final, duration=case.duration)
-            except (NoOrbit, SimulationError, ValueError) as error:
-                missing[f"{kind} margin"] = str(error)
-    return found
+                found[kind] = self.stages.get(
+                    f"{kind} margin",
+                    HuntingMargin,
+                    partial(hunting_margin, self.case.actuator, kind, inputs=self.final, duration=self.case.duration),
+                    failures=(NoOrbit, SimulationError, ValueError),
+                )
+            except Missing as reason:
+                self.missing[f"{kind} margin"] = str(reason)
+        return found
+
+    def causes(self) -> Causes | None:
+        """Why it hunts."""
+        find = partial(find_causes, self.case.actuator, self.run, **self._options())
+        try:
+            return self.stages.get("causes", Causes, find, failures=(SimulationError,))
+        except Missing as reason:
+            self.missing["causes"] = str(reason)
+            return None
+
+    def remedies(self, search: RemedySearch, tell: Callable[[float], None]) -> RemedyTable | None:
+        """What helps."""
+        try:
+            return search.finish(tell)
+        except SimulationError as error:
+            self.missing["remedies"] = str(error)
+            return None
+
+    def _options(self) -> dict[str, Any]:
+        return {"inputs": self.case.inputs, "resolution": RESOLUTION}
 
 
 def _model(case: Case, mode: str, inputs: dict[str, float]) -> LinearModel:

@@ -1,81 +1,30 @@
-"""A judgment as files: report.html with the pictures inside, the pictures, result.json."""
+"""A judgment as findings: report.html with the pictures inside, the pictures, result.json."""
 
-import base64
-import json
 import math
-import os
-import platform
-import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict
-from datetime import UTC, datetime
-from importlib import metadata
-from pathlib import Path
+from functools import partial
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from actuator import Orbit
+from actuator.hunting.margins import MOST
 from actuator.hunting.remedies import Remedy, cells
 from actuator.hunting.sampled_orbit import SampledOrbit
 from actuator.linear.plots import plot_bode
 from actuator.simulation.plots import plot_run
+from studies.findings import Findings, finite, rendered, versions
 from studies.judge import Insight, Judgment
 
-LIBRARIES = ("geared-actuator", "casadi", "control", "numpy", "scipy", "matplotlib")
-DPI = 130
 STEP_VIEW = 1.5  # s of the step that are shown
 CYCLES_VIEW = 3.5  # periods of a cycle that are shown
 
 
-def write_report(judgment: Judgment, folder: Path) -> list[Path]:
-    """Write report, pictures and result into `folder`; all of them or, on a failure, none.
-
-    Returns the paths that were written.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder, prefix=".writing-") as hidden:
-        work = Path(hidden)
-        pictures = {}
-        for name, figure in figures(judgment).items():
-            figure.savefig(work / f"{name}.png", dpi=DPI)
-            pictures[name] = base64.b64encode((work / f"{name}.png").read_bytes()).decode()
-        result = result_of(judgment)
-        (work / "result.json").write_text(json.dumps(result, indent=2, allow_nan=False) + "\n")
-        (work / "report.html").write_text(_html(judgment, result, pictures), encoding="utf-8")
-        return _moved(work, folder)
-
-
-def write_files(
-    pictures: dict[str, Figure],
-    result: dict[str, Any],
-    text: list[str],
-    folder: Path,
-    files: Mapping[str, Callable[[Path], None]] | None = None,
-) -> list[Path]:
-    """Write pictures, result.json and findings.txt into `folder`; all of them or, on a failure, none.
-
-    `files` are more of them, by name with what writes them.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder, prefix=".writing-") as hidden:
-        work = Path(hidden)
-        for name, figure in pictures.items():
-            figure.savefig(work / f"{name}.png", dpi=DPI)
-        (work / "result.json").write_text(json.dumps(_finite(result), indent=2, allow_nan=False) + "\n")
-        (work / "findings.txt").write_text("\n\n".join(text) + "\n", encoding="utf-8")
-        for name, write in (files or {}).items():
-            write(work / name)
-        return _moved(work, folder)
-
-
-def _moved(work: Path, folder: Path) -> list[Path]:
-    written = []
-    for path in sorted(work.iterdir()):
-        os.replace(path, folder / path.name)
-        written.append(folder / path.name)
-    return written
+def case_findings(judgment: Judgment, text: list[str]) -> Findings:
+    """All that is known of one case."""
+    result = result_of(judgment)
+    return Findings(pictures=figures(judgment), result=result, text=text, page=partial(_html, judgment, result))
 
 
 def figures(judgment: Judgment) -> dict[str, Figure]:
@@ -85,7 +34,8 @@ def figures(judgment: Judgment) -> dict[str, Figure]:
     end = float(run.t[-1])
     found = {"step": plot_run(run, signals, span=(0.0, min(STEP_VIEW, end)))}
     error = [name for name in ("position_error", "current", "motor_torque") if name in run.signals]
-    since = end - CYCLES_VIEW * hunting.period_s if hunting.cycles else end / 2
+    # what rests is shown from the start: its last half is rounding
+    since = end - CYCLES_VIEW * hunting.period_s if hunting.cycles else 0.0
     found["hunting"] = plot_run(run, error, span=(max(0.0, since), end))
     names = next((list(model.loops) for model in judgment.models if model.loops), [])
     for name in names:
@@ -103,7 +53,7 @@ def figures(judgment: Judgment) -> dict[str, Figure]:
 def result_of(judgment: Judgment) -> dict[str, Any]:
     """Everything that is a number, for machines; null where there is none (no cycle, no crossing)."""
     case, run = judgment.case, judgment.run
-    return _finite(
+    return finite(
         {
             "case": case.name,
             "title": case.title,
@@ -125,7 +75,7 @@ def result_of(judgment: Judgment) -> dict[str, Any]:
                 "mode_changes": len(run.changes),
             },
             "parameters": {p.name: {"value": p.default, "unit": p.unit} for p in run.system.parameters},
-            "versions": {"python": platform.python_version()} | {name: _version(name) for name in LIBRARIES},
+            "versions": versions(),
         }
     )
 
@@ -181,28 +131,11 @@ def _remedy(remedy: Remedy) -> dict[str, Any]:
     }
 
 
-def _version(library: str) -> str:
-    try:
-        return metadata.version(library)
-    except metadata.PackageNotFoundError:  # run from a checkout that is not installed
-        return "not installed"
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
-
-
-def _html(judgment: Judgment, result: dict[str, Any], pictures: dict[str, str]) -> str:
-    environment = Environment(loader=PackageLoader("studies"), autoescape=True, undefined=StrictUndefined)
-    environment.filters |= {"margin": _shown}
+def _html(judgment: Judgment, result: dict[str, Any], pictures: Mapping[str, str]) -> str:
     table = judgment.insight.remedies
-    return environment.get_template("report.html").render(
+    return rendered(
+        "report.html",
+        {"margin": _shown},
         case=judgment.case,
         hunting=judgment.hunting,
         models=judgment.models,
@@ -212,7 +145,7 @@ def _html(judgment: Judgment, result: dict[str, Any], pictures: dict[str, str]) 
         remedies=[cells(each) for each in (table.before, *table.ranked)] if table else [],
         pictures=pictures,
         ratio=judgment.case.actuator.gear.ratio(),
-        made=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        most=MOST,
     )
 
 

@@ -36,13 +36,15 @@ class Demand:
         Of the loops opened at speed reference and torque reference, in every mode [-], [rad]; the gain margin holds for
         gains that rise and gains that fall.
     delay_margin : float
-        Of the same loops: what sampling, filters and the rest that is not modeled may take [s].
+        Of the same loops: what is not in the model may take [s], which with a controller in continuous time is sampling
+        too.
     overshoot : float
-        Of the step response of the linear models [-].
+        Of a step of the amplitude [-].
     stiffness : float
         Load torque over load angle [N m/rad] at the frequency at which that is least.
-    peak_current : float
-        In a step of the amplitude [A], all contacts sliding.
+    peak_current, peak_torque : float or None
+        Of the motor in a step of the amplitude [A], [N m]; None where it may be any. A motor without electric part has
+        no current.
     standing_error : float
         Largest position error at which the actuator may come to rest [rad].
     stiction_margin : float
@@ -57,7 +59,8 @@ class Demand:
     delay_margin: Annotated[float, Unit("s"), Gt(0)] = 1e-3
     overshoot: Annotated[float, Unit("-"), Ge(0)] = 0.1
     stiffness: Annotated[float, Unit("N m/rad"), Gt(0)]
-    peak_current: Annotated[float, Unit("A"), Gt(0)]
+    peak_current: Annotated[float, Unit("A"), Gt(0)] | None = None
+    peak_torque: Annotated[float, Unit("N m"), Gt(0)] | None = None
     standing_error: Annotated[float, Unit("rad"), Gt(0)]
     stiction_margin: Annotated[float, Unit("-"), Ge(1)] = 1.3
 

@@ -36,7 +36,7 @@ from gear.balance import balance
 from gear.drawing import draw, table
 from gear.efficiency import efficiency
 from gear.planets import MeshLaws, Planets, separate
-from studies.paper import compound_planetary, compound_planetary_inputs
+from studies.checks.paper import compound_planetary, compound_planetary_inputs
 
 LOSSY = MeshLaws(elasticity=Linear(stiffness=1e8, damping=2e4), friction=Coulomb(sliding=0.1, static=0.15))
 LOSSLESS = MeshLaws(elasticity=Linear(stiffness=1e8, damping=2e4))

@@ -37,8 +37,8 @@ from gear import (
 )
 from gear.din3990 import reduced_radius
 from gear.motion import Sliding
+from studies.checks.paper import figure_9, figure_9_inputs, figure_9_start
 from studies.converter import converter
-from studies.paper import figure_9, figure_9_inputs, figure_9_start
 
 ROOM, COLD, WARM = (273.15 + temperature for temperature in (20, -55, 70))
 JET_OIL = KnownOil(name="Mobil Jet Oil II")

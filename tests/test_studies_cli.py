@@ -7,13 +7,15 @@ two built-in cases, of which one hunts and one comes to rest; HTML that needs no
 import json
 import math
 import re
+import shutil
 from html.parser import HTMLParser
 
 import pytest
+from click import Option
 from click.testing import CliRunner
 
 from studies import built_in
-from studies.__main__ import main
+from studies.__main__ import COMMANDS, main
 
 MASS = """
 title = "Mass on a guide"
@@ -113,11 +115,12 @@ def test_a_case_file_gives_a_verdict_in_words_and_numbers(mass):
 
 def test_everything_that_is_announced_is_written_and_nothing_else(mass):
     outcome, out = mass
-    written = sorted(path.name for path in out.iterdir())
+    written = sorted(path.name for path in out.iterdir() if path.name != "finished.jsonl")
     assert {"report.html", "result.json"} < set(written)
     assert f"and {len(written) - 1} more files" in outcome.output
     pictures = [name for name in written if name.endswith(".png")]
-    assert sorted([*pictures, "report.html", "result.json"]) == written
+    assert sorted([*pictures, "findings.txt", "report.html", "result.json"]) == written
+    assert json.loads((out / "result.json").read_text(encoding="utf-8"))["files"] == written
     assert all((out / name).read_bytes().startswith(PNG) for name in pictures)
 
 
@@ -191,6 +194,57 @@ def test_a_second_run_replaces_the_first(case_file, tmp_path):
         result = json.loads((out / "result.json").read_text(encoding="utf-8"))
         assert result["simulation"]["simulated_s"] == duration
     assert [path.name for path in out.iterdir() if path.name.startswith(".")] == []
+
+
+# -- interrupted --------------------------------------------------------------------------------------------
+
+
+def numbers(out):
+    """The result without what it cost."""
+    result = json.loads((out / "result.json").read_text(encoding="utf-8"))
+    return {name: value for name, value in result.items() if name not in ("case", "simulation")}
+
+
+def test_an_interrupted_run_says_so_and_goes_on_to_the_same_result(mass, case_file, tmp_path, monkeypatch):
+    def interrupt(*arguments, **options):
+        raise KeyboardInterrupt
+
+    out, path = tmp_path / "out", case_file(MASS)
+    with monkeypatch.context() as patch:
+        patch.setattr("studies.judge.find_causes", interrupt)
+        outcome = invoke(path, "--out", out)
+    assert outcome.exit_code == 130
+    assert outcome.output.splitlines()[1:] == ["", "interrupted; the same command goes on where it stopped"]
+    assert [each.name for each in out.iterdir()] == ["finished.jsonl"]
+    for name in ("find_orbit", "hunting_margin"):
+        monkeypatch.setattr(f"studies.judge.{name}", lambda *arguments, **options: pytest.fail("computed again"))
+    outcome = invoke(path, "--out", out)
+    assert outcome.exit_code == 0, outcome.output
+    assert f"taken from {out / 'finished.jsonl'}: orbit, stiction margin, integral gain margin" in outcome.output
+    assert numbers(out) == numbers(mass[1])
+
+
+def test_files_of_an_earlier_result_go_and_others_stay(mass, case_file, tmp_path):
+    out = tmp_path / "out"
+    shutil.copytree(mass[1], out)
+    (out / "mine.png").write_text("not of a study")
+    (out / ".writing-killed").mkdir()
+    assert (out / "causes.png").exists()
+    rests = MASS.replace("breakaway = 1.5", "breakaway = 1.0").replace("duration = 100", "duration = 5")
+    assert invoke(case_file(rests), "--out", out).exit_code == 0
+    names = {each.name for each in out.iterdir()}
+    assert {"mine.png", "finished.jsonl", "report.html", "step.png"} <= names
+    assert names.isdisjoint({"causes.png", "remedies.png", "orbit.png", ".writing-killed"})
+
+
+def test_an_interrupted_benchmark_promises_nothing(monkeypatch):
+    def interrupt(*arguments):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("studies.checks.commands.run_benchmark", interrupt)
+    outcome = invoke("benchmark")
+    assert outcome.exit_code == 130
+    assert outcome.output.strip() == "interrupted"
 
 
 # -- the built-in cases -------------------------------------------------------------------------------------
@@ -290,6 +344,41 @@ def test_an_unknown_case_is_refused_with_the_names_of_all(arguments, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("arguments", "option"),
+    [
+        (("--case", "aileron", "hunting"), "--case"),
+        (("--thorough", "gear-paper"), "--thorough"),
+        (("--list", "tuning"), "--list"),
+    ],
+)
+def test_an_option_that_a_command_does_not_heed_is_refused(arguments, option):
+    outcome = invoke(*arguments)
+    assert outcome.exit_code == 2
+    assert f"{option} is not for '{arguments[-1]}'" in outcome.output
+
+
+@pytest.mark.parametrize("command", [(), *((name,) for name in COMMANDS if name not in ("run", "benchmark"))])
+def test_a_folder_that_cannot_be_written_is_refused_at_once(command, tmp_path):
+    (tmp_path / "file").write_text("")
+    outcome = invoke(*command, "--out", tmp_path / "file" / "out")
+    assert outcome.exit_code == 2
+    assert f"cannot write to {tmp_path / 'file' / 'out'}: Not a directory; choose another folder" in outcome.output
+    outcome = invoke(*command, "--out", tmp_path / "file")
+    assert outcome.exit_code == 2
+    assert "is a file" in outcome.output
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_explains_every_option(command):
+    outcome = invoke(command, "--help")
+    assert outcome.exit_code == 0
+    assert all(option.help for option in COMMANDS[command].params if isinstance(option, Option))
+    if command != "benchmark":
+        assert "--out" in outcome.output
+        assert "goes on where it stopped" in " ".join(outcome.output.split())
+
+
 def test_an_unknown_option_and_an_unknown_command_are_refused():
     for argument in ("--cases", "simulate"):
         outcome = invoke(argument)
@@ -307,4 +396,4 @@ def test_a_run_that_cannot_be_completed_is_told_in_one_line_and_nothing_is_writt
     assert outcome.exit_code != 0
     assert isinstance(outcome.exception, SystemExit), repr(outcome.exception)
     assert "cannot go on" in outcome.output
-    assert not (tmp_path / "out").exists()
+    assert list((tmp_path / "out").iterdir()) == []

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from studies import cross_check_actuator as dymola
-from studies import cross_check_drive as motulator
-from studies import cross_check_record as record
 from studies.__main__ import main
-from studies.deviation import Deviation, table
+from studies.checks import cross_check_actuator as dymola
+from studies.checks import cross_check_drive as motulator
+from studies.checks import cross_check_record as record
+from studies.checks.deviation import Deviation, table
 
 ROWS = {"rod against": 1, "rod with noise": 1, "machine": 4, "drive": 4}
 
@@ -32,7 +32,7 @@ def written(tmp_path_factory):
 def test_the_command_writes_pictures_numbers_and_a_table(written):
     output, folder = written
     pictures = {f"cross_check_{name}.png" for name in ("actuator", "machine", "drive")}
-    assert {path.name for path in folder.iterdir()} == pictures | {"result.json", "findings.txt"}
+    assert {path.name for path in folder.iterdir()} == pictures | {"result.json", "findings.txt", "finished.jsonl"}
     assert "All within what is allowed: yes" in output
     assert "All within what is allowed: yes" in (folder / "findings.txt").read_text(encoding="utf-8")
 
@@ -163,11 +163,11 @@ def test_a_row_that_is_too_far_says_so():
 
 
 def test_a_deviation_that_is_too_large_ends_the_command_with_1(monkeypatch, tmp_path):
-    from studies.gear_paper import Figures
+    from studies.findings import Findings
 
     row = Deviation(what="x", unit="A", theirs=1.0, deviation=0.1, allowed=0.03)
-    found = Figures(pictures={}, result={"deviations": [row.as_result()]}, text=[table([row])])
-    monkeypatch.setattr("studies.__main__.run_cross_check", lambda *_: found)
+    found = Findings(pictures={}, result={"deviations": [row.as_result()]}, text=[table([row])])
+    monkeypatch.setattr("studies.checks.commands.run_cross_check", lambda *_: found)
     done = CliRunner().invoke(main, ["cross-check", "--out", str(tmp_path)])
     assert done.exit_code == 1
     assert "TOO FAR" in done.output

@@ -16,12 +16,16 @@ from click.testing import CliRunner
 from actuator import SineStream
 from studies.__main__ import main
 from studies.files import CaseError
-from studies.frequency_mask import Limit, checked, load_mask, phase_of
-from studies.frequency_response import PARTS, WrongRequest, load_positioner
+from studies.frequency.against import load_positioner
+from studies.frequency.corners import WrongRequest
+from studies.frequency.mask import Limit, checked, load_mask, phase_of
+from studies.frequency.plan import PARTS
+from studies.frequency.tables import write_netcdf
 
 INERTIA, GAIN, RATE, INTEGRAL = 1.0, 100.0, 8.0, 50.0
 FREQUENCIES = (0.5, 1.0, 2.0)  # Hz
 STROKE, AMPLITUDE = 40.0, 0.01  # deg, of it
+BIAS = 3.0  # N m
 MASS = f"""
 title = "A mass under a PID"
 
@@ -94,19 +98,19 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def outcome(folder):
-    """Of a study of two cases with a record laid over them, with its files in folder/out."""
+    """Of a study of two cases with a record laid over them and a bias load, with its files in folder/out."""
     time = np.arange(0, 30, 0.01)
     reference = np.random.default_rng(0).standard_normal(len(time))
     table = np.column_stack([time, reference, 0.5 * reference])
     np.savetxt(folder / "rig.csv", table, delimiter=",", header="time,reference,response", comments="")
-    beside = ("--against", folder / "heavier.toml", "--measured", folder / "rig.csv")
+    beside = ("--against", folder / "heavier.toml", "--measured", folder / "rig.csv", "--bias", BIAS)
     return invoke(*options(folder), *beside, "--out", folder / "out")
 
 
 @pytest.fixture
 def without_pictures(monkeypatch):
     """They take longer than all that is computed here."""
-    monkeypatch.setattr("studies.frequency_report._pictures", lambda *arguments: {})
+    monkeypatch.setattr("studies.frequency.report._pictures", lambda *arguments: {})
 
 
 def test_the_sines_are_those_of_the_closed_form(folder, outcome):
@@ -118,7 +122,11 @@ def test_the_sines_are_those_of_the_closed_form(folder, outcome):
     np.testing.assert_allclose(found[0], response(FREQUENCIES), rtol=1e-3)
     with (folder / "out" / "responses.csv").open(newline="", encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row["case"] == "mass"]
-    np.testing.assert_allclose([float(row["gain_db"]) for row in rows], 20 * np.log10(abs(found[0])), rtol=1e-9)
+    assert [float(row["bias_Nm"]) for row in rows] == [0.0] * 3 + [BIAS] * 3
+    gains = np.reshape([float(row["gain_db"]) for row in rows], (2, 3))
+    np.testing.assert_allclose(gains[0], 20 * np.log10(abs(found[0])), rtol=1e-9)
+    np.testing.assert_allclose(gains[1], gains[0], atol=1e-2)  # what is linear does not mind a bias load
+    assert all(float(row["distortion"]) < 1e-2 for row in rows)
 
 
 def test_the_compliance_is_that_of_the_closed_form(folder, outcome):
@@ -135,6 +143,12 @@ def test_the_margins_are_those_of_the_closed_form(folder, outcome):
     s = 1j * crossing["frequency"]
     loop = (GAIN + INTEGRAL / s + RATE * s) / (INERTIA * s**2)
     assert abs(loop) == pytest.approx(1, rel=1e-6)
+    s = 1j * np.geomspace(1, 100, 100_000)
+    loops = (GAIN + INTEGRAL / s + RATE * s) / (INERTIA * s**2)
+    peaks = result["sensitivity"]["torque_reference"]["forward"]
+    assert peaks["S"]["value"] == pytest.approx(abs(1 / (1 + loops)).max(), rel=1e-6)
+    assert peaks["T"]["value"] == pytest.approx(abs(loops / (1 + loops)).max(), rel=1e-6)
+    s = 1j * crossing["frequency"]
     assert crossing["phase_rad"] == pytest.approx(math.pi + np.angle(loop), rel=1e-6)
 
 
@@ -146,6 +160,9 @@ def test_everything_is_written_and_the_page_needs_nothing_else(folder, outcome):
         "stiffness_powered.nc",
         "stiffness_unpowered.nc",
         "mass_family.png",
+        "mass_harmonics.png",
+        "mass_places_1.png",
+        "mass_sensitivity_torque_reference.png",
         "heavier_test_step.png",
     } <= names
     page = (folder / "out" / "report.html").read_text(encoding="utf-8")
@@ -167,14 +184,15 @@ def test_a_mask_is_kept_or_missed_and_the_second_study_computes_nothing(
 ):
     peak = 20 * np.log10(abs(response(FREQUENCIES))).max()
     assert 0.5 < peak < 6  # dB: one mask is missed and the other kept
-    assert "mass: the mask is kept." in outcome.output
+    assert "mass, no bias: the mask is kept." in outcome.output
+    assert "mass, bias +3 N m: the mask is kept." in outcome.output
 
     def never(*arguments, **others):
         raise AssertionError("a finished point was computed again")
 
     monkeypatch.setattr("actuator.response.sine_stream.SineStream.measure", never)
-    monkeypatch.setattr("studies.frequency_tests.BenchWork.__call__", never)
-    (kept,) = (folder / "out").glob("finished-*.jsonl")
+    monkeypatch.setattr("studies.frequency.bench.BenchWork.__call__", never)
+    (kept,) = (folder / "out").glob("finished.jsonl")
     (tmp_path / kept.name).write_text(kept.read_text())
     again = invoke(*options(folder, "missed.toml"), "--out", tmp_path)
     assert again.exit_code == 0, again.output
@@ -186,10 +204,11 @@ def test_a_mask_is_kept_or_missed_and_the_second_study_computes_nothing(
 
 
 def test_a_killed_study_goes_on_where_it_stopped(folder, outcome, tmp_path, without_pictures, monkeypatch):
-    (kept,) = (folder / "out").glob("finished-*.jsonl")
+    (kept,) = (folder / "out").glob("finished.jsonl")
     lines = kept.read_text().splitlines(keepends=True)
     dropped = [line for line in lines if "at 2 Hz" in line]
-    mass, both = 1 + 2 * len(PARTS), 2 * (1 + 2 * len(PARTS))  # sines of 2 Hz: one of the reference, others of torque
+    # sines of 2 Hz: of the reference with a bias load and without, others of torque
+    mass, both = 1 + 2 * len(PARTS), 2 * (2 + 2 * len(PARTS))
     assert len(dropped) == both
     left = "".join(line for line in lines if line not in dropped)
     (tmp_path / kept.name).write_text(left + '{"key": "half')  # what a kill in the middle of a write leaves
@@ -203,7 +222,36 @@ def test_a_killed_study_goes_on_where_it_stopped(folder, outcome, tmp_path, with
     assert again.exit_code == 0, again.output
     assert len(computed) == mass and {point.frequency for point in computed} == {2.0}
     rows, before = ((path / "responses.csv").read_text().splitlines() for path in (tmp_path, folder / "out"))
-    assert rows == [row for row in before if not row.startswith("heavier")]
+    assert rows == [row for row in before if not row.startswith("heavier") and f",{BIAS}," not in row]
+
+
+def test_a_corner_is_the_case_with_its_parameters_and_all_but_its_sines_are_there_already(
+    folder, outcome, tmp_path, without_pictures, monkeypatch
+):
+    (kept,) = (folder / "out").glob("finished.jsonl")
+    (tmp_path / kept.name).write_text(kept.read_text())
+    computed, measure = [], SineStream.measure
+    monkeypatch.setattr(
+        "actuator.response.sine_stream.SineStream.measure",
+        lambda self, point: computed.append(point) or measure(self, point),
+    )
+    heavy = ("--corner", "heavy: gear.shafts.mass.inertia=3", "--bias", BIAS)
+    found = invoke(*options(folder, "missed.toml"), *heavy, "--out", tmp_path)
+    assert found.exit_code == 0, found.output
+    assert len(computed) == 2 * len(FREQUENCIES)  # with the bias load and without
+    with (tmp_path / "responses.csv").open(newline="", encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if row["corner"] == "heavy"]
+    expected = response(FREQUENCIES * 2, inertia=3.0)
+    gains = [float(row["gain_db"]) for row in rows]
+    np.testing.assert_allclose(gains, 20 * np.log10(abs(expected)), atol=1e-2)
+    result = json.loads((tmp_path / "result.json").read_text())["cases"]["mass"]
+    assert result["corners"] == {"as it is": {}, "heavy": {"gear.shafts.mass.inertia": 3.0}}
+    slack = {(row["corner"], row["bias"]): row["slack"] for row in result["checks"] if row["side"] == "gain_high_db"}
+    peak = 20 * np.log10(abs(response(FREQUENCIES, inertia=3.0))).max()
+    assert list(slack) == [("as it is", 0.0), ("heavy", 0.0), ("as it is", BIAS), ("heavy", BIAS)]
+    assert slack["heavy", BIAS] == pytest.approx(0.5 - peak, abs=0.01)
+    assert f"mass, heavy, bias +{BIAS:g} N m: the mask is missed: " in found.output
+    assert "heavy, overshoot" in result["tests"]["every corner"]
 
 
 def test_a_second_case_and_a_record_are_laid_beside_it(folder, outcome):
@@ -216,6 +264,18 @@ def test_a_second_case_and_a_record_are_laid_beside_it(folder, outcome):
     found = heavier.response_real.values + 1j * heavier.response_imaginary.values
     np.testing.assert_allclose(found, response(FREQUENCIES, inertia=2 * INERTIA), rtol=1e-3)
     assert (folder / "out" / "beside.png").exists()
+
+
+def test_cases_that_have_not_the_same_corners_share_a_file(tmp_path):
+    def data(names, value):
+        moves = (("set",), np.ones(len(names), bool))
+        return xarray.Dataset({"response": ("set", np.full(len(names), value)), "moves": moves}, {"set": names})
+
+    write_netcdf(tmp_path / "both.nc", {"one": data(["as it is", "cold"], 1 + 2j), "two": data(["cold"], 3j)})
+    found = xarray.open_dataset(tmp_path / "both.nc", engine="scipy")
+    assert found.response_imaginary.sel(set="cold").values.tolist() == [2.0, 3.0]
+    assert found.response_real.sel(case="one", set="as it is") == 1.0
+    assert np.isnan(found.moves.sel(case="two", set="as it is"))
 
 
 # -- limits ---------------------------------------------------------------------------------------------------
@@ -276,6 +336,10 @@ WRONG = {
     "a mask that is not there": (("--mask", "nowhere.toml"), "cannot be read"),
     "a record that is not there": (("--measured", "nowhere.csv"), "nowhere.csv: cannot be read"),
     "the same case twice": (("--against", "aileron"), "both cases are called aileron"),
+    "an unknown parameter": (("--corner", "motor.resistence=1"), "did you mean motor.resistance"),
+    "a corner without a number": (("--corner", "motor.resistance"), "a corner is NAME=VALUE,NAME=VALUE with numbers"),
+    "a bias load that is none": (("--bias", "nan"), "bias loads are numbers in N m, got nan"),
+    "a tuning that is none": (("--against", "nowhere.json"), "nowhere.json: is no result.json of a tuning"),
     "no stroke": (("--stroke", 0), "Invalid value for '--stroke'"),
 }
 
@@ -307,5 +371,14 @@ def test_a_case_without_a_controller_has_no_response(folder, tmp_path):
 def test_help_tells_the_options():
     found = invoke("--help")
     assert found.exit_code == 0
-    for word in ("--against", "--measured", "--mask", "--amplitudes", "FROM TO COUNT", "goes on where it stopped"):
+    for word in (
+        "--against",
+        "--corner",
+        "--bias",
+        "--measured",
+        "--mask",
+        "--amplitudes",
+        "FROM TO COUNT",
+        "goes on where it stopped",
+    ):
         assert word in " ".join(found.output.split())

@@ -4,11 +4,13 @@ Oracles: what the paper prints (85 % efficiency and breakout at half the stall l
 friction, 20 mode changes of the Coulomb case) and the quadrants' symmetry.
 """
 
+import json
+
 import pytest
 from click.testing import CliRunner
 
 from studies.__main__ import main
-from studies.gear_paper import cold_gearbox, figure_7, figure_9_with_din, figures_12_and_13
+from studies.checks.gear_paper import cold_gearbox, figure_7, figure_9_with_din, figures_12_and_13
 
 
 def test_a_cold_gearbox_has_the_published_efficiency_and_breakout():
@@ -43,11 +45,30 @@ def test_the_coulomb_case_slips_ten_times_and_din_friction_creeps():
     assert result["geometric"]["stuck_share"] < 0.1
 
 
-@pytest.mark.parametrize("where", ["before", "after"])
-def test_the_command_writes_pictures_numbers_and_findings(tmp_path, where):
-    out = ["--out", str(tmp_path)]
-    done = CliRunner().invoke(main, [*out, "gear-paper"] if where == "before" else ["gear-paper", *out])
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """The folder that the command writes."""
+    folder = tmp_path_factory.mktemp("paper")
+    done = CliRunner().invoke(main, ["--out", str(folder), "gear-paper"])
     assert done.exit_code == 0, done.output
-    names = {path.name for path in tmp_path.iterdir()}
+    return folder / "gear-paper"
+
+
+def test_the_command_writes_pictures_numbers_and_findings(written):
+    names = {path.name for path in written.iterdir()}
     assert {"figure_7.png", "figure_12.png", "figure_13.png", "result.json", "findings.txt"} <= names
-    assert "85 %" in (tmp_path / "findings.txt").read_text(encoding="utf-8")
+    assert names == {*json.loads((written / "result.json").read_text())["files"], "finished.jsonl"}
+    assert "85 %" in (written / "findings.txt").read_text(encoding="utf-8")
+
+
+def test_what_is_kept_is_not_computed_again_and_gives_the_same_files(written, tmp_path, monkeypatch):
+    for name in ("simulate", "balance"):
+        monkeypatch.setattr(f"studies.checks.gear_paper.{name}", None)
+    out = tmp_path / "again"
+    out.mkdir()
+    (out / "finished.jsonl").write_bytes((written / "finished.jsonl").read_bytes())
+    done = CliRunner().invoke(main, ["gear-paper", "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    assert "holds 4 results; those of this study are not computed again" in done.output
+    for path in written.iterdir():
+        assert (out / path.name).read_bytes() == path.read_bytes()

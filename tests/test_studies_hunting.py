@@ -13,13 +13,14 @@ import xarray
 from click.testing import CliRunner
 from mass_on_guide import MassOnGuide
 
-from studies import hunting_map as maps
 from studies.__main__ import main
-from studies.hunting import WrongPlan, plan_of
-from studies.hunting_ends import along, crossings, ends, with_boundary
-from studies.hunting_map import LABELS, Axis, Plan, compute, dataset
-from studies.hunting_settings import Setting, meaning, parameters_of
-from studies.hunting_store import PointStore
+from studies.hunting.ends import along, crossings, ends, with_boundary
+from studies.hunting.map import LABELS, Axis, Plan, compute, dataset
+from studies.hunting.settings import Setting, meaning, parameters_of
+from studies.hunting.study import WrongPlan, plan_of
+from studies.hunting.study import map as maps
+from studies.kept import Kept
+from studies.stages import Stages
 
 BREAKAWAY, GAIN = "gear.bearings.guide.breakaway", "controller.integral"
 MASS = """
@@ -68,9 +69,9 @@ def plan(case):
 
 
 @pytest.fixture(scope="module")
-def points(plan, tmp_path_factory):
+def points(plan):
     """All points of the map, in this process."""
-    return compute(plan, PointStore(tmp_path_factory.mktemp("map"), plan.fingerprint()), jobs=1)
+    return compute(plan, Stages(), jobs=1)
 
 
 def invoke(*arguments):
@@ -118,7 +119,12 @@ def test_lines_of_the_map_that_cross_a_boundary_are_found(plan, points):
 
 
 def test_the_exact_boundary_of_the_mass_is_its_sliding_friction(plan, points):
-    found = ends(plan, crossings(plan, points), jobs=1)
+    stages = Stages()
+    found = ends(plan, crossings(plan, points), stages, jobs=1, progress=lambda count: None)
+    told = []
+    again = ends(plan, crossings(plan, points), stages, jobs=1, progress=told.append)
+    assert told == [len(found)]  # all of them at once: none is followed again
+    assert again.keys() == found.keys()
     data = with_boundary(plan, dataset(plan, points), found)
     # the amplitude goes to zero where breakaway friction is no larger than sliding friction
     np.testing.assert_allclose(data.boundary.sel(corner=0, y=[4.0, 8.0]), 1.0, rtol=0, atol=1e-3)
@@ -142,26 +148,27 @@ def test_a_killed_map_goes_on_without_computing_a_point_twice(plan, points, tmp_
         computed.append(index)
         return points[index]
 
-    store = PointStore(tmp_path, plan.fingerprint())
+    def stages(plan=plan):
+        """As another process would find them."""
+        return Stages(Kept(tmp_path / "kept.jsonl"), plan.fingerprint())
+
     monkeypatch.setattr(maps, "point", counted)
     with pytest.raises(Killed):
-        compute(plan, store, jobs=1)
-    with store.path.open("a", encoding="utf-8") as file:
-        file.write('{"index": [0, 1, 1], "poi')  # what a kill in the middle of a write leaves
+        compute(plan, stages(), jobs=1)
+    with (tmp_path / "kept.jsonl").open("a", encoding="utf-8") as file:
+        file.write('{"key": "point (0, 1, 1)", "resu')  # what a kill in the middle of a write leaves
     monkeypatch.setattr(maps, "point", lambda plan, index: counted(plan, index, kill_after=99))
     told = []
-    assert compute(plan, store, jobs=1, progress=told.append) == points
+    assert compute(plan, stages(), jobs=1, progress=told.append) == points
     assert sorted(computed) == sorted(plan.indices())
     assert told[0] == 4 and sum(told) == 9
-    assert compute(plan, store, jobs=1) == points  # and now from the disk alone
+    assert compute(plan, stages(), jobs=1) == points  # and now from the disk alone
     assert len(computed) == 9
-
-
-def test_another_map_has_another_file(plan):
     other = Plan(case=plan.case, x=plan.x, y=Axis.between(GAIN, 0.0, 8.0, 4))
-    assert (
-        PointStore(plan.case.parent, plan.fingerprint()).path != PointStore(plan.case.parent, other.fingerprint()).path
-    )
+    assert "point (0, 0, 0)" in stages() and "point (0, 0, 0)" not in stages(other)
+
+
+def test_the_same_map_has_the_same_fingerprint(plan):
     assert plan.fingerprint() == Plan(case=plan.case, x=plan.x, y=plan.y).fingerprint()
 
 
@@ -227,10 +234,10 @@ def test_the_command_writes_pictures_numbers_and_the_data_set(case, tmp_path):
     assert data.corner.attrs["flag_meanings"] == "load.damping=0 load.damping=1"
 
 
-def test_several_processes_give_the_same_points(case, plan, tmp_path):
+def test_several_processes_give_the_same_points(case):
     small = Plan(case=case, x=Axis.between(BREAKAWAY, 1.0, 1.5, 2), y=Axis.between(GAIN, 4.0, 8.0, 2))
-    alone = compute(small, PointStore(tmp_path / "one", small.fingerprint()), jobs=1)
-    together = compute(small, PointStore(tmp_path / "two", small.fingerprint()), jobs=2)
+    alone = compute(small, Stages(), jobs=1)
+    together = compute(small, Stages(), jobs=2)
     assert together == alone
 
 

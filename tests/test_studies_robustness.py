@@ -17,8 +17,8 @@ from mass_on_guide import MassOnGuide
 from actuator import classify, simulate
 from studies.__main__ import main
 from studies.kept import Kept
-from studies.robustness import MissingLibrary, factors, robustness, spread, wilson
 from studies.specification import Tolerance
+from studies.tuning.robustness import MissingLibrary, factors, robustness, spread, wilson
 
 pytest.importorskip("SALib")
 
@@ -139,6 +139,8 @@ def test_a_mass_on_a_guide_hunts_with_a_known_probability(tmp_path):
 
     again = robustness(never, nominal, spreads(**{BREAKAWAY: 0.2}), done=Kept(path), **options)
     assert again.probabilities == found.probabilities
+    with pytest.raises(AssertionError, match="not run again"):  # nor is it taken for something else
+        robustness(never, nominal, spreads(**{BREAKAWAY: 0.2}), about="another demand", done=Kept(path), **options)
 
 
 @pytest.mark.parametrize(

@@ -14,28 +14,34 @@ from click.testing import CliRunner
 
 from actuator import Actuator, CurrentSource, Load, TorqueSource, loop_transfer, margins, trim
 from actuator.linear.gain_models import gain_model
-from controllers import Cascade, IntegralRemedies, Sampling
+from controllers import Cascade, IntegralRemedies
 from controllers.pid import PI, PID, P
 from gear import Bearing, Shaft, Transmission
 from studies import CaseError, load_case
 from studies.__main__ import main
 from studies.kept import Kept, fingerprint
 from studies.specification import Change, Corner, Demand, Specification, Tuning, load_specification
-from studies.tuning import (
-    DEAD_BAND,
+from studies.tuning.check import CornerCheck, check_corners
+from studies.tuning.corners import corner_modes
+from studies.tuning.design import Active, design
+from studies.tuning.measures import measures, worst
+from studies.tuning.plant import (
+    INTEGRAL,
+    POSITION,
+    SPEED,
+    NotTunable,
     closed_form,
     dead_banded,
+    for_linear_models,
     inertia_at_motor,
-    shortfalls,
-    tune,
-    twins_of,
     with_dead_band,
-    without_dead_band,
 )
-from studies.tuning_check import check_corners
-from studies.tuning_design import INTEGRAL, POSITION, SPEED, Active, NotTunable, design
-from studies.tuning_measures import LOOPS, corner_modes, measures, worst
+from studies.tuning.stiction import ACCURACY, MOST, Search, Seeker, StictionMargin, least, least_margin
+from studies.tuning.study import shortfalls, tune, twins_of
 
+DEAD_BAND = "controller.speed.remedies.dead_band"
+LOOPS = ("speed_reference", "torque_reference")
+PID_PATH = "controller."
 GAINS = (POSITION, SPEED, INTEGRAL)
 INPUTS = ("reference", "load_torque", "inject.speed_reference", "inject.torque_reference")
 OUTPUTS = ("load_angle", "current", "speed_reference", "torque_reference")
@@ -143,7 +149,7 @@ def test_step_response_and_its_derivatives(one):
 
 def test_every_measure_has_exact_slopes(one):
     gains = dict(zip(GAINS, (20.0, 0.8, 30.0), strict=True))
-    modes = corner_modes(without_dead_band(one), Corner("", {}), 1.5, gains)
+    modes = corner_modes(for_linear_models(one), Corner("", {}), 1.5, gains)
     middle = measures(modes, gains, demand(), {})
     for k, name in enumerate(gains):
         up, down = (
@@ -170,7 +176,7 @@ def test_margins_are_those_of_loop_margins(aileron):
 
 
 def test_friction_and_what_a_release_sets_free(one):
-    modes = corner_modes(without_dead_band(one), Corner("", {}), 1.5, {})
+    modes = corner_modes(for_linear_models(one), Corner("", {}), 1.5, {})
     assert modes.friction == pytest.approx(COULOMB, rel=1e-9)
     assert modes.released["forward"] == pytest.approx(1.5 * BREAKAWAY - COULOMB, rel=1e-9)
 
@@ -179,7 +185,7 @@ def test_slip_and_bandwidth_in_closed_form(one):
     # J s^2 + Kp s + Kp g = 0 with poles -a, -b and no integral: a step of torque ends at 1/(Kp g) from below
     gains = {POSITION: 10.0, SPEED: 0.5}
     parameters = {INTEGRAL: 1e-12}
-    modes = corner_modes(without_dead_band(one), Corner("", parameters), 1.5, gains)
+    modes = corner_modes(for_linear_models(one), Corner("", parameters), 1.5, gains)
     found = worst(measures(modes, gains, demand(), {}))
     assert found["slip"].value == pytest.approx((1.5 * BREAKAWAY - COULOMB) / 5.0, rel=1e-6)
     s = 2j * math.pi
@@ -199,6 +205,149 @@ def test_start_in_closed_form(aileron, one):
     assert start[INTEGRAL] == pytest.approx(INERTIA * 4 * rate * rate)
 
 
+# -- a PID -----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def positioner():
+    """The same inertia behind a torque source and a gearless PID."""
+    bearings = {"shaft": Bearing(shaft="shaft", coulomb=COULOMB, breakaway=BREAKAWAY, viscous=0.0)}
+    gear = Transmission(shafts={"shaft": Shaft(inertia=INERTIA)}, bearings=bearings, input="shaft", output="shaft")
+    law = PID(proportional=4.0, integral=20.0, derivative=0.3, filter_time=2e-3)
+    return Actuator(name="positioner", motor=TorqueSource(), gear=gear, load=Load(), controller=law)
+
+
+def test_pid_starts_with_three_poles_at_one_rate(positioner):
+    start = closed_form(positioner, demand())
+    rate = 2 * math.pi * 1.5
+    law = (INERTIA, start[f"{PID_PATH}derivative"], start[f"{PID_PATH}proportional"], start[f"{PID_PATH}integral"])
+    assert np.roots(law) == pytest.approx([-rate] * 3, rel=1e-4)
+    assert start[f"{PID_PATH}filter_time"] == pytest.approx(0.1 / rate)
+    assert with_dead_band(positioner, start, 1e-3)[f"{PID_PATH}remedies.dead_band"] == 1e-3
+
+
+def test_pid_slip_and_effort_in_closed_form(positioner):
+    # without an integral a step of torque ends at 1/Kp, from below where Kd > 2 sqrt(J Kp); the first demand is Kp sine
+    gains = {f"{PID_PATH}proportional": 4.0, f"{PID_PATH}derivative": 0.5}
+    plant = for_linear_models(positioner)
+    corner = Corner("", {f"{PID_PATH}integral": 1e-12, f"{PID_PATH}filter_time": 1e-5})
+    modes = corner_modes(plant, corner, 1.5, gains)
+    task = demand(peak_current=None, peak_torque=1.0)
+    found = measures(modes, gains, task, {})
+    deciding = worst(found)
+    assert deciding["slip"].value == pytest.approx((1.5 * BREAKAWAY - COULOMB) / 4.0, rel=1e-3)
+    assert deciding["peak torque"].value == pytest.approx(COULOMB + 4.0 * task.sine, rel=1e-6)
+    tighter = worst(measures(modes, gains, task, {"peak torque": 1.25}))["peak torque"]
+    assert tighter.slack == pytest.approx(deciding["peak torque"].slack - math.log(1.25))
+    assert {m.name for m in found if "margin" in m.name} >= {"phase margin at position", "delay margin at position"}
+
+
+def test_a_pid_is_tuned_until_it_does_not_hunt(positioner):
+    names = tuple(f"{PID_PATH}{name}" for name in ("proportional", "derivative", "filter_time"))
+    task = Specification(
+        title="Positioner",
+        case="",
+        demand=demand(peak_current=None, peak_torque=3.0, stiction_margin=1.2),
+        tuning=Tuning(gains=names, dead_band=True, range=20.0),
+    )
+    start = {name: value for name, value in closed_form(positioner, task.demand).items() if name in names}
+    modes = corner_modes(for_linear_models(positioner), Corner("only", {}), 1.2, start)
+    found = design([modes], start, task)
+    gains = with_dead_band(positioner, found.gains, found.standing_error)
+    plant, corner = dead_banded(positioner), Corner("only", {})
+    ((as_it_was,), (tuned,)) = (check_corners(plant, [corner], g, task.demand, workers=1) for g in ({}, gains))
+    assert as_it_was.hunts(1.0)
+    assert shortfalls([tuned], task.demand) == {}
+    assert tuned.peak_torque <= 3.0 * 1.001
+    assert math.isnan(tuned.peak_current)
+
+
+# -- what simulations ask for -----------------------------------------------------------------------------
+
+
+def check(**changed):
+    usual = {
+        "corner": "",
+        "verdicts": {"x1, 1 breakaway": "rest", "x1, 1.5 breakaway": "rest"},
+        "cycle": 0.0,
+        "standing_error": 0.01,
+        "followed": 0.9,
+        "overshoot": 0.1,
+        "peak_current": 10.0,
+        "peak_torque": 10.0,
+    }
+    return CornerCheck(**{**usual, **changed})
+
+
+@pytest.mark.parametrize(
+    ("changed", "asked"),
+    [
+        ({}, {}),
+        ({"overshoot": 0.6}, {"overshoot": 1.02 * 1.2}),
+        ({"peak_current": 120.0}, {"peak current": 1.02 * 1.2}),
+        ({"standing_error": 0.11}, {"standing error": 1.02 * 1.1}),
+        ({"followed": 0.5}, {"bandwidth": 1.02 / (math.sqrt(2) * 0.5)}),
+        ({"verdicts": {"x1, 1.5 breakaway": "hunting"}}, {"slip": 1.25}),
+        # what hunts is first to stop hunting
+        ({"verdicts": {"x1, 1 breakaway": "hunting"}, "overshoot": 2.0, "peak_current": 1e3}, {"slip": 1.25}),
+    ],
+)
+def test_what_simulations_show_short_is_tightened_by_as_much(changed, asked):
+    assert shortfalls([check(), check(**changed)], demand()) == pytest.approx(asked)
+
+
+def test_tightened_demands_are_met_by_as_much_more(one):
+    start = {POSITION: 10.0, SPEED: 0.3}
+    modes = corner_modes(for_linear_models(one), Corner("only", {INTEGRAL: 1e-12}), 1.5, start)
+    task = specification(peak_current=2.0)
+    plain, tight = (design([modes], start, task, asked) for asked in ({}, {"peak current": 1.25}))
+    for found, limit in ((plain, 2.0), (tight, 1.6)):
+        assert worst(found.measures)["peak current"].value == pytest.approx(limit, rel=1e-4)
+    closer = design([modes], start, specification(), {"standing error": 4.0})
+    assert closer.standing_error <= 0.1 / 4.0
+
+
+# -- where hunting begins ---------------------------------------------------------------------------------
+
+
+class Pretender(Seeker):
+    """Hunts in a window of factors."""
+
+    def __init__(self, low, high, defaults):
+        self.low, self.high, self.defaults, self.tried = low, high, defaults, []
+
+    def hunts(self, search, factor):
+        self.tried.append(factor)
+        return self.low <= factor < self.high
+
+
+@pytest.mark.parametrize("begins", [0.7, 1.1, 1.29, 1.31, 1.7, 3.9])
+@pytest.mark.parametrize("width", [1.6, 100.0])
+def test_the_first_factor_of_hunting_is_found(begins, width):
+    # also where hunting ends again, because the motor is too weak to break away
+    values = {"gear.bearings.a.breakaway": 2.0, "gear.bearings.a.coulomb": 1.0}
+    seeker = Pretender(begins, begins * width, values)
+    found = StictionMargin("", **seeker(Search(Corner("", {}), {}, demand(stiction_margin=1.3))))
+    if begins < 1.3 < begins * width or begins > 1.3:
+        assert found.rests < begins <= found.hunts <= ACCURACY * found.rests
+    assert min(seeker.tried) >= 0.5
+
+
+def test_no_hunting_and_nothing_but_hunting():
+    values = {"gear.bearings.a.breakaway": 2.0, "gear.bearings.a.coulomb": 1.0}
+    search = Search(Corner("", {"gear.bearings.a.coulomb": 1.6}), {}, demand(stiction_margin=1.3))
+    never, always = (StictionMargin("", **Pretender(low, 1e3, values)(search)) for low in (99.0, 0.0))
+    assert (never.rests, never.hunts) == (pytest.approx(MOST), None)
+    assert (always.rests, always.hunts) == (None, pytest.approx(0.8))  # where breakaway is as large as sliding friction
+    assert "none up to factor 4" in never.words
+    assert least_margin([never, always]) is always
+
+
+def test_least_factor_leaves_no_stiction(aileron):
+    values = {p.name: float(p.default) for p in aileron.system().parameters}
+    assert least(values) == pytest.approx(0.12 / 0.25)
+
+
 # -- the optimum ------------------------------------------------------------------------------------------
 
 
@@ -212,7 +361,7 @@ def test_the_optimum_lies_where_delay_and_phase_let_it(one):
     # without an integral D = H/(Kp g): the speed loop Kp/(J s) (1 + g/s) is as fast as the delay margin allows
     task = specification(peak_current=1e4, delay_margin=3e-3)
     start = {POSITION: 10.0, SPEED: 0.3}
-    modes = corner_modes(without_dead_band(one), Corner("only", {INTEGRAL: 1e-12}), 1.5, start)
+    modes = corner_modes(for_linear_models(one), Corner("only", {INTEGRAL: 1e-12}), 1.5, start)
     found = design([modes], start, task)
     names = [each.name for each in found.active]
     assert "slip" in names
@@ -223,7 +372,7 @@ def test_the_optimum_lies_where_delay_and_phase_let_it(one):
 
 def test_a_multiplier_is_what_the_demand_costs(one):
     start = {POSITION: 10.0, SPEED: 0.3}
-    modes = corner_modes(without_dead_band(one), Corner("only", {INTEGRAL: 1e-12}), 1.5, start)
+    modes = corner_modes(for_linear_models(one), Corner("only", {INTEGRAL: 1e-12}), 1.5, start)
     # peak current = friction + sine * g * Kp at the first instant: the product of the gains is what it bounds
     limit = 2.0
     found = design([modes], start, specification(peak_current=limit))
@@ -240,7 +389,7 @@ def test_a_multiplier_is_what_the_demand_costs(one):
 
 def test_demands_that_exclude_each_other(one):
     start = {POSITION: 10.0, SPEED: 0.3}
-    modes = corner_modes(without_dead_band(one), Corner("only", {INTEGRAL: 1e-12}), 1.5, start)
+    modes = corner_modes(for_linear_models(one), Corner("only", {INTEGRAL: 1e-12}), 1.5, start)
     with pytest.raises(NotTunable, match=r"no gains meet all demands at once; nearest: .*standing error"):
         design([modes], start, specification(peak_current=0.3, standing_error=1e-3))
 
@@ -272,6 +421,8 @@ def test_a_servo_that_hunts_is_tuned_until_it_does_not(tuned):
     assert not any(check.hunts(1.0) or check.hunts(1.3) for check in tuned.rounds[-1].checks)
     assert all(check.followed > 1 / math.sqrt(2) for check in tuned.rounds[-1].checks)
     assert max(check.standing_error for check in tuned.rounds[-1].checks) < tuned.design.standing_error * 1.01
+    assert all(margin.hunts <= 1.0 for margin in tuned.margins_before)
+    assert all(margin.rests >= 1.3 for margin in tuned.margins)
     errors = [error for _, error in tuned.trade_off]
     assert errors[0] < errors[1]
 
@@ -293,20 +444,19 @@ def test_dead_band_at_the_motor(aileron):
 
 
 def test_twins_are_corners_that_linear_models_cannot_tell_apart(one):
-    modes = [corner_modes(without_dead_band(one), Corner(name, {}), 1.5, {}) for name in ("a", "b")]
+    modes = [corner_modes(for_linear_models(one), Corner(name, {}), 1.5, {}) for name in ("a", "b")]
     gains = dict(zip(GAINS, (20.0, 0.8, 8.0), strict=True))
     assert twins_of([m for each in modes for m in measures(each, gains, demand(), {})]) == {"a": ["a", "b"]}
 
 
 def test_report(tuned, tmp_path):
     from studies.cases import Case
-    from studies.report import write_files
-    from studies.tuning_report import tuning_files
+    from studies.tuning.report import tuning_findings
 
     case = Case(name="servo", title="", description="", actuator=tuned.original, duration=1.0, inputs={})
-    found = tuning_files(tuned, case)
-    write_files(found.pictures, found.result, found.text, tmp_path, found.files)
-    pictures = {"loops.png", "step.png", "trade_off.png"}
+    found = tuning_findings(tuned, case)
+    found.save(tmp_path)
+    pictures = {"loops.png", "margins.png", "step.png", "trade_off.png"}
     tables = {"corners.csv", "measures.csv", "findings.txt", "result.json", "report.html"}
     assert {path.name for path in tmp_path.iterdir()} == pictures | tables
     result = json.loads((tmp_path / "result.json").read_text())
@@ -314,7 +464,9 @@ def test_report(tuned, tmp_path):
     assert result["gains"]["tuned"][DEAD_BAND] > 0
     html = (tmp_path / "report.html").read_text()
     assert "All demands met" in html
-    assert html.count("data:image/png;base64") == 3
+    assert "begin to hunt" in html
+    assert [row["corner"] for row in result["stiction_margins"]["tuned"]] == ["as it is", "less"]
+    assert html.count("data:image/png;base64") == 4
 
 
 # -- wrong input ------------------------------------------------------------------------------------------
@@ -323,18 +475,28 @@ def test_report(tuned, tmp_path):
 @pytest.mark.parametrize(
     ("plant", "says"),
     [
+        (lambda: replace(servo(), motor=TorqueSource(), controller=None), "takes a Cascade or a PID"),
         (
             lambda: replace(
-                servo(), motor=TorqueSource(), controller=PID(proportional=1.0, integral=1.0, derivative=1.0)
+                servo(), controller=replace(servo().controller, position=PI(proportional=1.0, integral=1.0))
             ),
-            "takes a Cascade",
+            "of two integrals in a row",
         ),
-        (lambda: replace(servo(), sampling=Sampling(speed=1e-3, position=1e-3)), "continuous time"),
     ],
 )
 def test_what_cannot_be_tuned(plant, says):
     with pytest.raises(NotTunable, match=says):
         tune(specification(), plant(), workers=1)
+
+
+def test_wrong_gains_and_efforts_name_the_right_ones(positioner):
+    with pytest.raises(
+        NotTunable, match=r"may name controller.proportional, .*derivative, .*, not controller.position"
+    ):
+        tune(specification(), positioner, workers=1)
+    task = replace(specification(), tuning=Tuning(gains=("controller.proportional",), dead_band=True))
+    with pytest.raises(NotTunable, match="no current; demand a peak_torque"):
+        tune(task, positioner, workers=1)
 
 
 def test_without_a_dead_band_stiction_and_integral_hunt(one):

@@ -1,0 +1,211 @@
+"""Does this project move an electromechanical actuator as Dymola does: Modelica's ActuatorWithNoise.
+
+The example Blocks.Examples.Noise.ActuatorWithNoise of the Modelica Standard Library, by A. Kloeckner, F. van der
+Linden, D. Zimmer and M. Otter (DLR), and its published result (Modelica Association, MAP-LIB_ReferenceResults, BSD
+3-clause; Dymola 2020x), here built from this project's parts. Its parts, and what stands for them:
+
+    ideal rotation to translation   rod and load are shafts turned by 300 rad per metre
+    LossyGear, rigid teeth          teeth 10 times as stiff as the free play, friction on the motor's side, which sticks
+    bearing friction of LossyGear   behind the teeth, as there: 0.1 N m at the motor is 1 N m at the wheel
+    noise on the measured angle     the input `motor_angle_error`, a new value every 5 ms: its numbers are this
+                                    project's, since those of Dymola's generator are not published
+"""
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from actuator import Actuator, CurrentSource, LinearLoad, Rack, Run, Staircase, Step, WhiteNoise, simulate
+from controllers import PI, Cascade, FilteredDerivative, RateLimit
+from gear import (
+    Bearing,
+    Coupling,
+    EfficiencyPoint,
+    GivenPair,
+    Linear,
+    Mesh,
+    Shaft,
+    TabulatedEfficiency,
+    Transmission,
+)
+from studies.checks.cross_check_record import require_columns
+from studies.checks.deviation import Deviation
+
+DATA = Path(__file__).parent.parent / "data" / "cross_check_actuator.json"
+DURATION = 8.0  # s
+RESOLUTION = 2e-4  # s
+RATIO = 10.0
+TURNS = 300.0  # rad of rod and load per metre
+COMMAND = 50.0  # rad of the motor
+TRAVEL = COMMAND / RATIO / TURNS  # m
+TORQUE_CONSTANT = 3 * 112.3 / (2 * math.pi * 50 / 2)  # N m per A rms: 112.3 V rms a phase at 50 Hz, 2 pole pairs
+SPEED_GAIN = 10.0 * TORQUE_CONSTANT
+NOISE, NOISE_PERIOD = 0.01, 5e-3  # rad, s
+TEETH = 1e7  # N m/rad at the wheel
+WHEEL = 1e-3  # kg m^2; LossyGear has no inertia, the rotors are 58 there
+ALLOWED = 1e-3  # of the travel
+COLORS = ("#4d4d4d", "#3b75af", "#e1812c")
+
+
+class Recorded(NamedTuple):
+    """Dymola's rod position [m] over time [s]."""
+
+    time: np.ndarray
+    position: np.ndarray
+
+
+def recorded(csv: Path | None = None) -> Recorded:
+    """From the published table, or where none is given the part of it that is stored here."""
+    if csv is None:
+        stored = json.loads(DATA.read_text(encoding="utf-8"))
+        return Recorded(np.array(stored["time_s"]), np.array(stored["rod_position_m"]))
+    rows = np.genfromtxt(csv, delimiter=",", names=True, deletechars="")
+    require_columns(csv, ("time", "rodMass.s"), rows.dtype.names or ())
+    return Recorded(rows["time"], rows["rodMass.s"])
+
+
+def actuator_with_noise() -> Actuator:
+    """The actuator of the example; its noise is an input."""
+    return Actuator(
+        motor=CurrentSource(torque_constant=TORQUE_CONSTANT, inertia=0.29, lag=1e-3),
+        gear=_gear(),
+        load=LinearLoad(mass=100.0, force=1e4, mechanism=Rack(radius=1 / TURNS)),
+        controller=Cascade(
+            position=PI(proportional=3.0, integral=3.0 / 0.5),
+            speed=PI(proportional=SPEED_GAIN, integral=SPEED_GAIN / 0.05),
+            current=None,
+            speed_limit=1e4,  # far away: there is none
+            feedback="motor",
+            reference=RateLimit(rate=50.0 / RATIO, time=1e-3),
+            speed_from=FilteredDerivative(time=0.01),
+        ),
+        name="ActuatorWithNoise",
+    )
+
+
+def _gear() -> Transmission:
+    # friction on wheel A alone; a wheel B inside a ring turns the same way
+    pair = GivenPair(radius_a=0.01, radius_b=-0.01 * RATIO, friction_arm_a=0.01, friction_arm_b=0.0)
+    per_square = 1 / (pair.radius_b**2 * math.cos(pair.pressure_angle))
+    efficiency = EfficiencyPoint(speed=0.0, a_drives=0.85, b_drives=0.80)
+    return Transmission(
+        shafts={
+            "motor": Shaft(inertia=0.29),
+            "wheel": Shaft(inertia=WHEEL),
+            "rod": Shaft(inertia=3.0 / TURNS**2),
+            "load": Shaft(inertia=1e-9),  # its mass is that of the load
+        },
+        meshes={
+            "gearbox": Mesh(
+                a="motor",
+                b="wheel",
+                pair=pair,
+                elasticity=Linear(stiffness=TEETH * per_square, damping=math.sqrt(TEETH * WHEEL) * per_square),
+                friction=TabulatedEfficiency(points=(efficiency,)),
+                stick_by="conjugate speed",
+            )
+        },
+        bearings={"gearbox": Bearing(shaft="wheel", coulomb=0.1 * RATIO, breakaway=0.1 * RATIO)},
+        couplings={
+            "free_play": Coupling(a="wheel", b="rod", stiffness=1e6, damping=1e4, gap=math.radians(0.1)),
+            "rod": Coupling(a="rod", b="load", stiffness=1e8 / TURNS**2, damping=1e5 / TURNS**2),
+        },
+        input="motor",
+        output="load",
+    )
+
+
+def noise(seed: int = 0) -> Staircase:
+    """Uniform noise on the measured motor angle [rad]."""
+    law, values = WhiteNoise(distribution="uniform", seed=seed), []
+    state = law.memory().initial
+    for _ in range(round(DURATION / NOISE_PERIOD)):
+        values.append(NOISE * float(law.value(state)))
+        state = law.advance(state)
+    return Staircase(times=tuple(NOISE_PERIOD * k for k in range(len(values))), values=tuple(values))
+
+
+def move(plant: Actuator, error: Staircase | None = None, progress: Callable[[float], None] | None = None) -> Run:
+    """The example's 8 s; its controller starts at rest with the first measured angle."""
+    step = {"reference": Step(time=0.5, after=COMMAND / RATIO)}
+    if error is None:
+        return simulate(plant, DURATION, inputs=step, resolution=RESOLUTION, progress=progress)
+    first = error.values[0]
+    start = {
+        "controller.speed_from.filtered_position": first,
+        "controller.speed.integral": SPEED_GAIN * 3.0 * first,  # so that the speed law's output is zero
+    }
+    inputs = {**step, "motor_angle_error": error}
+    return simulate(plant, DURATION, inputs=inputs, start=start, resolution=NOISE_PERIOD, progress=progress)
+
+
+def rod(run: Run) -> np.ndarray:
+    """Position of the rod [m]; the load is a spring away from it."""
+    return run["rod.angle"] / TURNS
+
+
+class ActuatorCheck(NamedTuple):
+    """Runs without and with noise beside Dymola's."""
+
+    theirs: Recorded
+    clean: Run
+    noisy: Run
+
+    def deviation(self) -> np.ndarray:
+        """Without noise, less theirs, at their outputs [m]."""
+        return np.interp(self.theirs.time, self.clean.t, rod(self.clean)) - self.theirs.position
+
+    def moved(self) -> np.ndarray:
+        """What the noise moves [m], at the points of the run with noise."""
+        return rod(self.noisy) - np.interp(self.noisy.t, self.clean.t, rod(self.clean))
+
+    def rows(self) -> list[Deviation]:
+        """The table."""
+        count = len(self.theirs.time)
+        return [
+            Deviation(
+                what=f"{what}, of the travel", unit="mm", theirs=1e3 * TRAVEL, deviation=1e3 * most, allowed=ALLOWED
+            )
+            for what, most in (
+                (f"rod against Dymola's, {count} outputs", float(np.abs(self.deviation()).max())),
+                ("rod with noise against without", float(np.abs(self.moved()).max())),
+            )
+        ]
+
+    def picture(self) -> Figure:
+        """Both positions, and what lies between them."""
+        figure = Figure(figsize=(9, 6), layout="constrained")
+        above, below = figure.subplots(2, 1, sharex=True)
+        above.plot(self.clean.t, 1e3 * rod(self.clean), color=COLORS[1], label="here, without noise")
+        above.plot(
+            self.theirs.time, 1e3 * self.theirs.position, ".", color=COLORS[0], markersize=4, label="Dymola, with noise"
+        )
+        above.set_ylabel("rod position in mm")
+        above.legend(loc="lower right", fontsize="small")
+        below.plot(self.noisy.t, 1e6 * self.moved(), color=COLORS[2], lw=0.5, label="here, with noise less without")
+        below.plot(
+            self.theirs.time, 1e6 * self.deviation(), ".", color=COLORS[0], markersize=4, label="here less Dymola"
+        )
+        for side in (-1, 1):
+            label = f"allowed: {100 * ALLOWED:g} % of {1e3 * TRAVEL:.4g} mm" if side > 0 else None
+            below.axhline(side * 1e6 * ALLOWED * TRAVEL, color=COLORS[0], linestyle="--", lw=0.8, label=label)
+        below.set_ylabel("deviation in um")
+        below.set_xlabel("time in s")
+        below.legend(loc="lower right", fontsize="small", bbox_to_anchor=(1.0, 0.08))
+        for axes in (above, below):
+            axes.grid(alpha=0.3)
+        return figure
+
+
+def check_actuator(theirs: Recorded, progress: Callable[[float], None]) -> ActuatorCheck:
+    """Run it without and with noise; `progress` is called with the share that is done."""
+    plant = actuator_with_noise()
+    clean = move(plant)
+    progress(0.2)
+    noisy = move(plant, noise(), lambda time: progress(0.2 + 0.8 * time / DURATION))
+    return ActuatorCheck(theirs, clean, noisy)

@@ -1,0 +1,252 @@
+"""Does this project move a 2.2 kW PMSM drive as motulator does, machine and control.
+
+The published example "2.2-kW interior PMSM, current-vector control" of motulator 0.18.0 (MIT licence), with measured
+rotor position, a stiff link of 540 V and an averaged inverter: 1500 rpm from 0.2 s on, 14 N m from 0.6 s on.
+
+Machine: this project's laws of motor and inverter get the recorded duty ratios and load torque. Those of sample k act
+from k + 1 to k + 2, as the drive computes for one period.
+
+Drive: this project's own sampled cascade, of the same bandwidths, limits and delay. What it does otherwise: it filters
+its torque demand and then limits it, where the other lets its limited current reference follow with that bandwidth, so
+it is faster for a moment where the limit is met; and one current law for both axes cancels the pole of the winding,
+where the other has one on flux linkages with two degrees of freedom.
+"""
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from matplotlib.figure import Figure
+
+from actuator import PMSM, Actuator, Inverter, Run, Step, simulate
+from actuator.parts.park import to_axes
+from controllers import PI, Cascade, LowPass, PositionObserver, Sampling
+from gear import Shaft, Transmission
+from studies.checks.cross_check_record import (
+    LOAD,
+    LOAD_TIME,
+    PERIOD,
+    SIGNALS,
+    SPEED,
+    SPEED_TIME,
+    Recorded,
+    Stretch,
+    marks,
+)
+from studies.checks.deviation import Deviation
+
+INERTIA = 0.015  # kg m^2, of all that turns
+COUPLING = 1e-4  # kg m^2, the part of it that stands for the gear's only shaft
+MOTOR = PMSM(
+    pole_pairs=3,
+    resistance=3.6,
+    inductance_d=0.036,
+    inductance_q=0.051,
+    flux=0.545,
+    inertia=INERTIA - COUPLING,
+)
+INVERTER = Inverter(dc_voltage=540.0, current_limit=1.5 * math.sqrt(2) * 4.3)
+DURATION = 1.2  # s
+CURRENT_BANDWIDTH, REFERENCE_BANDWIDTH, SPEED_BANDWIDTH, OBSERVER_BANDWIDTH = (
+    2 * math.pi * hertz for hertz in (200.0, 100.0, 4.0, 400.0)
+)
+STEPS = 2  # of Runge and Kutta in a period; twice as many change the currents by less than 1e-7 of their peaks
+MACHINE_ALLOWED, DRIVE_ALLOWED = 1e-3, 3e-2  # of the peaks, of the marks
+COLORS = ("#4d4d4d", "#3b75af", "#e1812c", "#5a8f3c")
+
+
+# -- the machine ------------------------------------------------------------------------------------------
+
+
+@lru_cache(maxsize=1)
+def _one_period() -> ca.Function:
+    """(state, duties and load torque) -> state a period later."""
+    x, u = ca.SX.sym("x", 4), ca.SX.sym("u", 4)
+
+    def flow(state: ca.SX) -> ca.SX:
+        currents, speed, electrical = [state[0], state[1]], state[2], MOTOR.pole_pairs * state[3]
+        asked = to_axes([INVERTER.dc_voltage * u[k] for k in range(3)], electrical)
+        rates = MOTOR.derivatives(currents, INVERTER.terminal_voltages(asked, currents, electrical), speed)
+        return ca.vertcat(*rates, (MOTOR.torque(currents) - u[3]) / INERTIA, speed)
+
+    after, h = x, PERIOD / STEPS
+    for _ in range(STEPS):
+        k1 = flow(after)
+        k2 = flow(after + h / 2 * k1)
+        k3 = flow(after + h / 2 * k2)
+        k4 = flow(after + h * k3)
+        after += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+    return ca.Function("one_period", [x, u], [after])
+
+
+def driven_machine(stretch: Stretch) -> dict[str, np.ndarray]:
+    """What the machine does with the recorded duty ratios and load torque, at the known samples."""
+    inputs = np.vstack([stretch.duties, stretch.load])
+    states = _one_period().mapaccum(inputs.shape[1])(stretch.start, inputs).full()
+    direct, quadrature, speed, _ = np.column_stack([stretch.start, states])[:, stretch.samples]
+    torque = np.array([float(MOTOR.torque([d, q])) for d, q in zip(direct, quadrature, strict=True)])
+    return dict(zip(SIGNALS, (direct, quadrature, torque, speed), strict=True))
+
+
+# -- the drive --------------------------------------------------------------------------------------------
+
+
+def drive() -> Actuator:
+    """A speed drive of this project with the other's bandwidths, limits and delay."""
+    speed = PI(
+        proportional=2 * SPEED_BANDWIDTH * INERTIA,
+        integral=SPEED_BANDWIDTH**2 * INERTIA,
+        setpoint_weight=0.5,
+        back_calculation=SPEED_BANDWIDTH,
+    )
+    current = PI.for_winding(
+        resistance=MOTOR.resistance,
+        inductance=(MOTOR.inductance_d + MOTOR.inductance_q) / 2,
+        bandwidth=CURRENT_BANDWIDTH,
+    )
+    return Actuator(
+        motor=MOTOR,
+        inverter=INVERTER,
+        gear=Transmission(shafts={"rotor": Shaft(inertia=COUPLING)}, input="rotor", output="rotor"),
+        controller=Cascade(
+            position=None,
+            speed=speed,
+            current=current,
+            speed_limit=1000.0,  # far away
+            speed_from=PositionObserver(bandwidth=OBSERVER_BANDWIDTH),
+            torque_filters={"reference": LowPass(frequency=REFERENCE_BANDWIDTH)},
+            current_demand="least current",
+        ),
+        sampling=Sampling(current=PERIOD, speed=PERIOD, delay=1),
+        name="2.2 kW drive",
+    )
+
+
+def move() -> Run:
+    """The example's 1.2 s."""
+    inputs = {
+        "speed_reference": Step(time=SPEED_TIME, after=SPEED),
+        "load_torque": Step(time=LOAD_TIME, after=-LOAD),
+    }
+    return simulate(drive(), DURATION, inputs=inputs, resolution=PERIOD)
+
+
+def signals_of(run: Run) -> dict[str, np.ndarray]:
+    """By the names of SIGNALS."""
+    names = ("motor.current_d", "motor.current_q", "motor_torque", "motor_speed")
+    return {name: run[signal] for name, signal in zip(SIGNALS, names, strict=True)}
+
+
+# -- both -------------------------------------------------------------------------------------------------
+
+
+class DriveCheck(NamedTuple):
+    """The machine on recorded voltages, and the drive, beside the other's."""
+
+    theirs: Recorded
+    machine: list[dict[str, np.ndarray]]  # per stretch
+    run: Run
+
+    def rows(self) -> list[Deviation]:
+        """The table."""
+        machine = [
+            Deviation(
+                what=f"machine on recorded voltages: {name}, {self._count()} samples",
+                unit=unit,
+                theirs=self.theirs.peaks[name],
+                deviation=max(float(np.abs(error).max()) for error in self._errors(name)),
+                allowed=MACHINE_ALLOWED,
+            )
+            for name, unit in SIGNALS.items()
+        ]
+        ours = marks(self.run.t, signals_of(self.run))
+        return machine + [
+            Deviation(
+                what=f"drive: {name}",
+                unit="rad/s" if name == "speed dip" else "A",
+                theirs=value,
+                deviation=ours[name] - value,
+                allowed=DRIVE_ALLOWED,
+            )
+            for name, value in self.theirs.marks.items()
+        ]
+
+    def _count(self) -> int:
+        return sum(len(stretch.samples) for stretch in self.theirs.stretches)
+
+    def _errors(self, name: str) -> list[np.ndarray]:
+        return [
+            ours[name] - stretch.signals[name]
+            for ours, stretch in zip(self.machine, self.theirs.stretches, strict=True)
+        ]
+
+    def machine_picture(self) -> Figure:
+        """Per stretch the signals over their peaks, and the deviations."""
+        stretches = self.theirs.stretches
+        figure = Figure(figsize=(9, 6), layout="constrained")
+        panels = figure.subplots(2, len(stretches), sharex="col", sharey="row", squeeze=False)
+        for k, stretch in enumerate(stretches):
+            time = 1e3 * (stretch.begin + PERIOD * stretch.samples)
+            above, below = panels[:, k]
+            for (name, peak), color in zip(self.theirs.peaks.items(), COLORS, strict=True):
+                above.plot(
+                    time, self.machine[k][name] / peak, color=color, label=f"{_words(name)}, {peak:.4g} {SIGNALS[name]}"
+                )
+                few = slice(None, None, max(1, len(time) // 80))
+                above.plot(
+                    time[few], stretch.signals[name][few] / peak, "o", color=color, markersize=3, fillstyle="none"
+                )
+                below.plot(time, 1e6 * self._errors(name)[k] / peak, color=color, label=_words(name))
+            below.set_xlabel("time in ms")
+            for axes in (above, below):
+                axes.grid(alpha=0.3)
+        panels[0, 0].set_ylabel("signal over its peak")
+        panels[1, 0].set_ylabel(f"deviation in 1e-6\nof the peak ({1e6 * MACHINE_ALLOWED:g} allowed)")
+        panels[0, -1].legend(title="peaks (circles: motulator)", fontsize="small", title_fontsize="small")
+        panels[1, 0].legend(fontsize="small")
+        return figure
+
+    def drive_picture(self) -> Figure:
+        """Speed, torque and currents of both drives, and what lies between them."""
+        ours, theirs = signals_of(self.run), self.theirs
+        figure = Figure(figsize=(9, 7.5), layout="constrained")
+        speed, torque, current, error = figure.subplots(4, 1, sharex=True)
+        for axes, names, label in (
+            (speed, ("speed",), "speed in rad/s"),
+            (torque, ("torque",), "torque in N m"),
+            (current, ("current_d", "current_q"), "current in A"),
+        ):
+            for name in names:
+                color = COLORS[list(SIGNALS).index(name)]
+                axes.plot(self.run.t, ours[name], color=color, label=f"{_words(name)}, here")
+                axes.plot(
+                    theirs.time,
+                    theirs.curves[name],
+                    "--",
+                    color=color,
+                    lw=2.5,
+                    alpha=0.5,
+                    label=f"{_words(name)}, motulator",
+                )
+            axes.set_ylabel(label)
+        for (name, peak), color in zip(theirs.peaks.items(), COLORS, strict=True):
+            between = np.interp(theirs.time, self.run.t, ours[name]) - theirs.curves[name]
+            error.plot(theirs.time, 100 * between / peak, color=color, label=_words(name))
+        error.set_yscale("symlog", linthresh=1.0)
+        error.set_ylabel("deviation in %\nof the peak")
+        error.set_xlabel("time in s")
+        for axes in (speed, torque, current, error):
+            axes.grid(alpha=0.3)
+            axes.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
+        return figure
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def check_drive(theirs: Recorded) -> DriveCheck:
+    """The machine on recorded voltages, and the drive."""
+    return DriveCheck(theirs, [driven_machine(stretch) for stretch in theirs.stretches], move())

@@ -1,0 +1,128 @@
+"""What a study has found, and how it is written: pictures, numbers, sentences, tables, a page. All of it or nothing."""
+
+import base64
+import io
+import json
+import math
+import os
+import platform
+import shutil
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from matplotlib.figure import Figure
+
+LIBRARIES = ("geared-actuator", "casadi", "control", "numpy", "scipy", "matplotlib")
+DPI = 130
+RESULT, TEXT, PAGE, WRITING = "result.json", "findings.txt", "report.html", ".writing-"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Findings:
+    """What a study has found.
+
+    Parameters
+    ----------
+    pictures : mapping of str to Figure or bytes
+        By name; bytes are those of a PNG file.
+    result : dict
+        Everything that is a number, for machines.
+    text : list of str
+        Sentences, the most important first.
+    files : mapping of str to str or callable
+        More of them by name: their text, or what writes them to a path.
+    page : callable or None
+        Gives report.html from the pictures, by name, in base64.
+    """
+
+    pictures: Mapping[str, Figure | bytes]
+    result: dict[str, Any]
+    text: list[str]
+    files: Mapping[str, str | Callable[[Path], None]] = field(default_factory=dict)
+    page: Callable[[Mapping[str, str]], str] | None = None
+
+    def save(self, folder: Path) -> list[Path]:
+        """Write all files into `folder` or, on a failure, none; those of an earlier result go. Returns their paths."""
+        folder.mkdir(parents=True, exist_ok=True)
+        for left in folder.glob(f"{WRITING}*"):  # by one that was killed
+            shutil.rmtree(left, ignore_errors=True)
+        earlier = _written_before(folder)
+        with tempfile.TemporaryDirectory(dir=folder, prefix=WRITING) as hidden:
+            work = Path(hidden)
+            self._write(work)
+            names = sorted([RESULT, *(path.name for path in work.iterdir())])
+            result = json.dumps({**finite(self.result), "files": names}, indent=2, allow_nan=False)
+            (work / RESULT).write_text(result + "\n")
+            for name in names:
+                os.replace(work / name, folder / name)
+        for name in earlier - set(names):
+            (folder / name).unlink(missing_ok=True)
+        return [folder / name for name in names]
+
+    def _write(self, folder: Path) -> None:
+        """Everything but the numbers."""
+        images = {
+            name: picture if isinstance(picture, bytes) else png(picture) for name, picture in self.pictures.items()
+        }
+        files: dict[str, str | Callable[[Path], None]] = {TEXT: "\n\n".join(self.text) + "\n", **self.files}
+        if self.page is not None:
+            files[PAGE] = self.page({name: base64.b64encode(image).decode() for name, image in images.items()})
+        for name, image in images.items():
+            (folder / f"{name}.png").write_bytes(image)
+        for name, content in files.items():
+            if isinstance(content, str):
+                (folder / name).write_text(content, encoding="utf-8", newline="")
+            else:
+                content(folder / name)
+
+
+def _written_before(folder: Path) -> set[str]:
+    """Names that the result in a folder lists."""
+    try:
+        names = json.loads((folder / RESULT).read_text(encoding="utf-8"))["files"]
+        return {name for name in names if Path(name).name == name}
+    except (OSError, ValueError, KeyError, TypeError):  # no result, or none of these studies
+        return set()
+
+
+def png(figure: Figure) -> bytes:
+    """A figure as a picture."""
+    image = io.BytesIO()
+    figure.savefig(image, dpi=DPI, format="png")
+    return image.getvalue()
+
+
+def rendered(template: str, filters: Mapping[str, Callable[..., str]] | None = None, **values: Any) -> str:
+    """A page from a template; every value that it uses must be there, and `made` is the time."""
+    environment = Environment(loader=PackageLoader("studies"), autoescape=True, undefined=StrictUndefined)
+    environment.filters |= dict(filters or {})
+    return environment.get_template(template).render(made=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"), **values)
+
+
+def versions(*more: str) -> dict[str, str]:
+    """Of Python and the libraries that a result depends on."""
+    return {"python": platform.python_version()} | {name: _version(name) for name in (*LIBRARIES, *more)}
+
+
+def _version(library: str) -> str:
+    try:
+        return metadata.version(library)
+    except metadata.PackageNotFoundError:  # run from a checkout that is not installed
+        return "not installed"
+
+
+def finite(value: Any) -> Any:
+    """The same for JSON: None where a number is not finite."""
+    if isinstance(value, dict):
+        return {key: finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

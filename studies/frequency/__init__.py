@@ -1,0 +1,1 @@
+"""The frequency-response report."""

@@ -1,0 +1,157 @@
+"""Bench tests of the frequency-response study, by name: each an outcome of numbers and a picture that can be kept."""
+
+import base64
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+from matplotlib.figure import Figure
+
+from actuator import (
+    Actuator,
+    Bench,
+    SimulationError,
+    SinePoint,
+    SineStream,
+    back_driving,
+    free_play,
+    hold_test,
+    locked,
+    rate_test,
+    soak_test,
+    staircase_test,
+    step_test,
+    triangle_test,
+    unpowered,
+)
+from actuator.response.bench import Numbers
+from studies.findings import png
+
+SMALLEST = 1e-5  # of the stroke, from which the threshold is sought
+LARGEST = 0.5  # of the stroke, up to which it is
+PLAY = 0.5  # of the largest torque, in the test of free play
+CORNERS = "every corner"  # the one test that depends on them
+INCREMENT = 5e-4  # of the stroke, in the staircase
+
+
+@dataclass(frozen=True, kw_only=True)
+class BenchPlan:
+    """What the tests need to know besides the actuator.
+
+    Parameters
+    ----------
+    stroke : float
+        From end to end [rad].
+    torque : float
+        Largest on the load [N m].
+    frequencies : tuple of float
+        At which the threshold is sought [Hz].
+    sets : mapping of str to mapping of str to float
+        Parameters by name of the corner.
+    inputs : mapping of str to float
+        Constant inputs, without the reference.
+    """
+
+    stroke: float
+    torque: float
+    frequencies: tuple[float, ...]
+    sets: Mapping[str, Mapping[str, float]]
+    inputs: Mapping[str, float]
+
+
+class BenchWork:
+    """The work of a sweep: from the name of a test to what came of it."""
+
+    def __init__(self, actuator: Actuator, plan: BenchPlan) -> None:
+        self.actuator, self.plan = actuator, plan
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Another process builds its own model: expressions do not travel."""
+        return {"actuator": replace(self.actuator), "plan": self.plan}
+
+    def __call__(self, name: str) -> dict[str, Any]:
+        """Numbers with units by name, what is found in words, the picture as PNG in base64; and why there is none."""
+        try:
+            found = TESTS[name](self.actuator, self.plan)
+        except (ValueError, SimulationError) as error:
+            return {"numbers": {}, "words": "", "picture": "", "reason": str(error)}
+        picture = base64.b64encode(png(found.figure)).decode() if found.figure else ""
+        return {"numbers": found.numbers, "words": found.words, "picture": picture, "reason": ""}
+
+
+class Found(NamedTuple):
+    """What comes of a test."""
+
+    numbers: Numbers
+    figure: Figure | None
+    words: str = ""
+
+
+def _bench(actuator: Actuator, plan: BenchPlan) -> Bench:
+    return Bench(plant=actuator, stroke=plan.stroke, inputs=plan.inputs)
+
+
+def _drawn(test: Any) -> Found:
+    return Found(test.numbers, test.plot())
+
+
+def _hold(actuator: Actuator, plan: BenchPlan) -> Found:
+    test = hold_test(_bench(actuator, plan))
+    return Found(test.numbers, test.plot(), f"{test.verdict.verdict} ({test.verdict.reason})")
+
+
+def _threshold(actuator: Actuator, plan: BenchPlan) -> Found:
+    stream = SineStream(plant=actuator)
+    found: Numbers = {}
+    for frequency in plan.frequencies:
+        point = SinePoint(amplitude=1.0, frequency=frequency, inputs=plan.inputs)
+        value = stream.threshold(point, SMALLEST * plan.stroke, LARGEST * plan.stroke, accuracy=1e-2)
+        found[f"threshold at {frequency:.3g} Hz"] = (value, "rad")
+    return Found(found, None)
+
+
+def _free_play(actuator: Actuator, plan: BenchPlan) -> Found:
+    found = free_play(locked(actuator), torque=PLAY * plan.torque, inputs=_of_load(plan))
+    numbers = {
+        "free play": (found.width_rad, "rad"),
+        "lost motion": (found.lost_motion_rad, "rad"),
+        "stiffness of the gear": (found.stiffness, "N m/rad"),
+    }
+    return Found(numbers, found.plot())
+
+
+def _back_driving(actuator: Actuator, plan: BenchPlan) -> Found:
+    found: Numbers = {}
+    figure = None
+    for word, sign in (("forward", 1), ("backward", -1)):
+        test = back_driving(unpowered(actuator), highest=sign * plan.torque, inputs=_of_load(plan))
+        found[f"torque that drives back, {word}"] = (math.inf if test.locks else test.torque, "N m")
+        figure = figure or test.plot()
+    return Found(found, figure)
+
+
+def _soak(actuator: Actuator, plan: BenchPlan) -> Found:
+    if len(plan.sets) == 1:
+        raise ValueError("there is no corner but the actuator as it is; name others with --corner")
+    return _drawn(soak_test(_bench(actuator, plan), plan.sets))
+
+
+def _of_load(plan: BenchPlan) -> dict[str, float]:
+    """The inputs that an actuator without motor and controller still has."""
+    return {name: value for name, value in plan.inputs.items() if name == "load_torque"}
+
+
+TESTS: dict[str, Callable[[Actuator, BenchPlan], Found]] = {
+    "threshold": _threshold,
+    "step": lambda actuator, plan: _drawn(step_test(_bench(actuator, plan))),
+    "slow triangle": lambda actuator, plan: _drawn(triangle_test(_bench(actuator, plan))),
+    "staircase": lambda actuator, plan: _drawn(
+        staircase_test(_bench(actuator, plan), increment=INCREMENT * plan.stroke)
+    ),
+    "hold": _hold,
+    "rate and stall": lambda actuator, plan: _drawn(rate_test(_bench(actuator, plan), highest=2 * plan.torque)),
+    CORNERS: _soak,
+    "free play": _free_play,
+    "back driving": _back_driving,
+}

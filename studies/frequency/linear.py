@@ -1,0 +1,111 @@
+"""The linear models of an actuator for a report: per contact mode loops, margins, poles and closed-loop responses."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import control
+
+from actuator import (
+    Actuator,
+    LiftedMargins,
+    Margins,
+    ModeModels,
+    Poles,
+    lifted_margins,
+    margins,
+    mode_models,
+    poles,
+)
+from actuator.ledger import PREFIX
+from studies.frequency.corners import Place
+from studies.frequency.sensitivity import Peak, Sensitivities, peak_of, sensitivities
+
+OUTPUT = "load_angle"
+LOAD = "load_torque"
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinearPart:
+    """The linear models in every mode that can be reached.
+
+    Attributes
+    ----------
+    models : ModeModels
+        At the operating point.
+    closed, compliance : mapping of str to StateSpace
+        Load angle over reference and over load torque, all loops closed, by mode.
+    loops : mapping of str to mapping of str to StateSpace
+        By the signal at which they are opened, then by mode.
+    margins : mapping of str to mapping of str to Margins or LiftedMargins
+        Of them.
+    sensitivities : mapping of str to mapping of str to Sensitivities or None
+        Likewise; None where nothing passes.
+    yields : mapping of str to Peak
+        Largest compliance by mode [rad/(N m)].
+    poles : mapping of str to Poles
+        By mode.
+    missing : mapping of str to str
+        Loops that cannot be opened, and why.
+    """
+
+    models: ModeModels
+    closed: Mapping[str, control.StateSpace] = field(repr=False)
+    compliance: Mapping[str, control.StateSpace] = field(repr=False)
+    loops: Mapping[str, Mapping[str, control.StateSpace]] = field(repr=False)
+    margins: Mapping[str, Mapping[str, Margins | LiftedMargins]]
+    sensitivities: Mapping[str, Mapping[str, Sensitivities | None]] = field(repr=False)
+    yields: Mapping[str, Peak]
+    poles: Mapping[str, Poles]
+    missing: Mapping[str, str]
+
+
+def linear_part(actuator: Actuator, inputs: Mapping[str, float]) -> LinearPart:
+    """Linearize in every mode at an operating point.
+
+    Raises
+    ------
+    NoEquilibrium
+        Where no mode can be reached.
+    """
+    models = mode_models(actuator, inputs=inputs)
+    loops: dict[str, Mapping[str, control.StateSpace]] = {}
+    missing: dict[str, str] = {}
+    for name in (quantity.name for quantity in models.models[0].point.system.inputs):
+        if name.startswith(PREFIX):
+            at = name.removeprefix(PREFIX)
+            try:
+                loops[at] = models.loops(at)
+            except ValueError as error:  # a signal that is not held between the ticks of its clock
+                missing[at] = str(error)
+    compliance = models.responses(LOAD, OUTPUT)
+    return LinearPart(
+        models=models,
+        closed=models.responses("reference", OUTPUT),
+        compliance=compliance,
+        loops=loops,
+        margins={at: {mode: _margins(loop) for mode, loop in opened.items()} for at, opened in loops.items()},
+        sensitivities={
+            at: {mode: sensitivities(loop) for mode, loop in opened.items()} for at, opened in loops.items()
+        },
+        yields={mode: peak_of(model) for mode, model in compliance.items()},
+        poles={model.name: poles(model.point, drifting=model.drifting) for model in models},
+        missing=missing,
+    )
+
+
+def _margins(loop: control.StateSpace) -> Margins | LiftedMargins:
+    return margins(loop) if loop.ninputs == 1 else lifted_margins(loop)
+
+
+def closed_at(
+    actuator: Actuator, inputs: Mapping[str, float], sets: Mapping[str, Mapping[str, float]], place: Place
+) -> dict[str, control.StateSpace]:
+    """Load angle over reference by mode, all loops closed, in a corner with a bias load.
+
+    Raises
+    ------
+    NoEquilibrium
+        Where no mode can be reached.
+    """
+    biased = {**inputs, LOAD: inputs.get(LOAD, 0.0) + place.bias}
+    return mode_models(actuator, inputs=biased, parameters=sets[place.corner]).responses("reference", OUTPUT)

@@ -1,0 +1,213 @@
+"""A frequency-response study as files: report.html, pictures, result.json, tables as CSV, netCDF."""
+
+import base64
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from actuator import LiftedMargins, Margins, Spectrum
+from actuator.linear.plots import plot_modes
+from studies.findings import Findings, versions
+from studies.frequency.loop_pictures import plot_compliance, plot_sensitivities
+from studies.frequency.mask import LimitCheck
+from studies.frequency.page import SIDES, html
+from studies.frequency.pictures import plot_beside, plot_family, plot_places
+from studies.frequency.plan import PARTS, Plan
+from studies.frequency.sensitivity import Sensitivities
+from studies.frequency.study import Study
+from studies.frequency.tables import margin_rows, response_rows, stiffness_rows, write_netcdf, write_rows
+from studies.kept import program
+
+ABREAST = 3  # places in a picture
+
+
+def study_findings(plan: Plan, studies: Sequence[Study], measured: Sequence[Spectrum] = ()) -> Findings:
+    """Pictures, numbers, sentences and tables of one study, or of several side by side."""
+    several = len(studies) > 1
+
+    def named(label: str, name: str) -> str:
+        return f"{label}_{name}" if several else name
+
+    pictures: dict[str, Figure | bytes] = {}
+    for study in studies:
+        label = study.case.name
+        pictures |= {named(label, name): figure for name, figure in _pictures(plan, study, measured).items()}
+        tests = {name: test["picture"] for name, test in study.tests.items() if test["picture"]}
+        pictures |= {named(label, file_name(name)): base64.b64decode(image) for name, image in tests.items()}
+    if several:
+        pictures["beside"] = plot_beside(studies, _compared(plan))
+    text, result = sentences(plan, studies), result_of(plan, studies)
+    prefixes = {study.case.name: named(study.case.name, "") for study in studies}
+    files: dict[str, str | Callable[[Path], None]] = {
+        "responses.csv": lambda path: write_rows(path, response_rows(plan, studies)),
+        "stiffness.csv": lambda path: write_rows(path, stiffness_rows(studies)),
+        "margins.csv": lambda path: write_rows(path, margin_rows(studies)),
+        "responses.nc": lambda path: write_netcdf(path, {s.case.name: s.family.data for s in studies}),
+    }
+    for word in ("powered", "unpowered"):
+        found = {s.case.name: s.stiffness[word].data for s in studies if word in s.stiffness}
+        if found:
+            files[f"stiffness_{word}.nc"] = lambda path, found=found: write_netcdf(path, found)
+    return Findings(
+        pictures=pictures,
+        result=result,
+        text=text,
+        files=files,
+        page=lambda found: html(plan, studies, measured, result, text, (found, prefixes)),
+    )
+
+
+def file_name(name: str) -> str:
+    """Of the picture of a bench test."""
+    return "test_" + name.replace(" ", "_")
+
+
+def _compared(plan: Plan) -> list[float]:
+    """Amplitudes of a comparison [rad]: those of the mask."""
+    return sorted({limit.amplitude * plan.stroke for limit in plan.mask.limits})
+
+
+def _pictures(plan: Plan, study: Study, measured: Sequence[Spectrum]) -> dict[str, Figure]:
+    linear = study.linear
+    places = list(study.checks)
+    found = {"family": plot_family(study, plan.mask, plan.stroke, measured), "harmonics": study.family.plot_harmonics()}
+    if len(places) > 1:
+        for k in range(0, len(places), ABREAST):
+            found[f"places_{k // ABREAST + 1}"] = plot_places(study, places[k : k + ABREAST], plan.mask, plan.stroke)
+    found["closed"] = plot_modes(linear.closed, "load angle over reference, all loops closed")
+    found["compliance"] = plot_compliance(linear.compliance, linear.yields)
+    for at, loops in linear.loops.items():
+        words = at.replace("_", " ")
+        if all(loop.ninputs == 1 for loop in loops.values()):
+            found[f"loop_{at}"] = plot_modes(loops, f"loop opened at {words}")
+        if any(linear.sensitivities[at].values()):
+            found[f"sensitivity_{at}"] = plot_sensitivities(linear.sensitivities[at], f"loop opened at {words}")
+    return found | {f"stiffness_{word}": stiffness.plot() for word, stiffness in study.stiffness.items()}
+
+
+def sentences(plan: Plan, studies: Sequence[Study]) -> list[str]:
+    """What came of it."""
+    found = []
+    for study in studies:
+        name = study.case.name
+        for place, checks in study.checks.items():
+            at = ", ".join(part for part in (name, study.words(place)) if part)
+            missed = "; ".join(_missed(plan, check) for check in checks if not check.met)
+            found.append(f"{at}: the mask is {f'missed: {missed}' if missed else 'kept'}.")
+        thresholds = study.tests["threshold"]["numbers"]
+        if thresholds:
+            each = ", ".join(
+                f"{math.degrees(value):.3g} deg at {key.removeprefix('threshold at ')}"
+                for key, (value, _) in thresholds.items()
+            )
+            found.append(f"{name}: no contact slides below {each} (amplitude of the sine of the reference).")
+        if study.tests["hold"]["words"]:
+            found.append(f"{name}, held after a step of 2 %: {study.tests['hold']['words']}.")
+        if study.family.notes:
+            settled = study.family.data.settled
+            found.append(f"{name}: {int((~settled.astype(bool)).sum())} of {settled.size} sines have not settled.")
+    return found
+
+
+def _missed(plan: Plan, check: LimitCheck) -> str:
+    what, scale, unit = SIDES[check.side]
+    at = f"{math.degrees(check.amplitude * plan.stroke):.3g} deg and {check.frequency:.3g} Hz"
+    by = f"by {-scale * check.slack:.2g} {unit}" if math.isfinite(check.slack) else "nothing moves"
+    return f"{what}, at {at}, {by}"
+
+
+# -- numbers ----------------------------------------------------------------------------------------------
+
+
+def result_of(plan: Plan, studies: Sequence[Study]) -> dict[str, Any]:
+    """Everything that is a number, for machines; null where there is none."""
+    return {
+        "plan": {
+            "stroke_rad": plan.stroke,
+            "amplitudes": list(plan.all_amplitudes),
+            "frequencies_Hz": sorted(plan.frequencies),
+            "torque_parts": list(PARTS),
+            "torque_frequencies_Hz": list(plan.torque_frequencies),
+            "biases_Nm": list(plan.all_biases),
+        },
+        "mask": {
+            "title": plan.mask.title,
+            "limits": [
+                {
+                    "amplitude": limit.amplitude,
+                    "frequencies_Hz": list(limit.frequencies),
+                    **{side: list(getattr(limit, side)) for side in SIDES if getattr(limit, side)},
+                }
+                for limit in plan.mask.limits
+            ],
+        },
+        "cases": {study.case.name: _result(study) for study in studies},
+        "source": program(),
+        "versions": versions(),
+    }
+
+
+def _result(study: Study) -> dict[str, Any]:
+    linear = study.linear
+    return {
+        "title": study.case.title,
+        "model": study.model,
+        "met": study.met,
+        "corners": study.sets,
+        "checks": [
+            {**place._asdict(), **check._asdict(), "met": check.met}
+            for place, checks in study.checks.items()
+            for check in checks
+        ],
+        "operating_point": dict(study.inputs) | {"reference": 0.0},
+        "largest_torque_Nm": study.torque,
+        "modes": {model.name: model.contacts for model in linear.models},
+        "unreachable": dict(linear.models.unreachable),
+        "margins": {
+            at: {mode: _margin_numbers(found) for mode, found in modes.items()} for at, modes in linear.margins.items()
+        },
+        "sensitivity": {
+            at: {mode: each and _peaks(each) for mode, each in modes.items()}
+            for at, modes in linear.sensitivities.items()
+        },
+        "largest_compliance": {
+            mode: {"rad_per_Nm": each.value, "frequency": each.frequency} for mode, each in linear.yields.items()
+        },
+        "poles": {
+            mode: [
+                {
+                    "real": pole.value.real,
+                    "imaginary": pole.value.imag,
+                    "damping": pole.damping,
+                    "participation": dict(pole.participation),
+                }
+                for pole in poles
+            ]
+            for mode, poles in linear.poles.items()
+        },
+        "tests": {
+            name: {"reason": test["reason"]}
+            if test["reason"]
+            else {key: {"value": value, "unit": unit} for key, (value, unit) in test["numbers"].items()}
+            | ({"words": test["words"]} if test["words"] else {})
+            for name, test in study.tests.items()
+        },
+        "notes": [*study.family.notes, *(note for each in study.stiffness.values() for note in each.measured.notes)],
+        "missing": {**linear.missing, **study.missing},
+        "parameters": {name: {"value": value, "unit": unit} for name, (value, unit) in study.parameters.items()},
+    }
+
+
+def _peaks(found: Sensitivities) -> dict[str, Any]:
+    """Largest S and T, and where [rad/s]."""
+    return {"S": found.sensitivity_peak._asdict(), "T": found.complementary_peak._asdict()}
+
+
+def _margin_numbers(found: Margins | LiftedMargins) -> dict[str, Any]:
+    if isinstance(found, LiftedMargins):
+        return asdict(found)
+    return {"gain_db": found.gain_db, **asdict(found)}

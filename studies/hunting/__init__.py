@@ -1,0 +1,1 @@
+"""Where a case hunts: maps over two parameters, and exact boundaries in them."""

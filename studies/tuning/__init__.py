@@ -1,0 +1,1 @@
+"""Gains from a specification, and what becomes of them over tolerances."""

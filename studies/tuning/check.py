@@ -1,0 +1,202 @@
+"""A design held against its demands by simulation, in every corner: does it hunt, does it follow, what does it draw."""
+
+import math
+from collections.abc import Callable, Mapping, MutableMapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from actuator.actuator import Actuator
+from actuator.hunting.decide import decide
+from actuator.hunting.verdict import REST
+from actuator.response.sine_stream import SinePoint, SineStream
+from actuator.response.sweep import sweep
+from actuator.simulation.engine import SimulationError
+from actuator.simulation.signals import Step
+from studies.kept import fingerprint
+from studies.specification import Corner, Demand
+from studies.tuning.corners import BREAKAWAY, sliding_of
+from studies.tuning.plant import defaults_of
+
+STEPS = (0.1, 1.0, 10.0)  # of the demanded amplitude: a small move, the move itself, a large one
+BEFORE, DURATION = 0.05, 10.0  # s, when the step comes and how long is looked at first
+RESOLUTION = 2.5e-3  # s
+LONGEST = 6.0  # times the duration, for runs that do not decide
+STEP, SINE = "step", "sine"
+
+
+class Trial(NamedTuple):
+    """One simulation: a step of a size [rad], or a sine of an amplitude [rad] and frequency [Hz]."""
+
+    kind: str
+    parameters: dict[str, float]
+    size: float
+    frequency: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class CornerCheck:
+    """What the simulations of one corner show.
+
+    Attributes
+    ----------
+    corner : str
+        Its name.
+    verdicts : dict of str to str
+        By step size over the demanded amplitude and factor on breakaway friction, "x0.1, 1.3 breakaway".
+    cycle : float
+        Largest amplitude of a cycle at the factor 1 [rad]; zero where nothing hunts.
+    standing_error : float
+        Largest error at rest [rad], of those runs that rest.
+    followed : float
+        Load angle over reference at the demanded bandwidth and amplitude [-].
+    overshoot : float
+        Of the step of the demanded amplitude over its size [-].
+    peak_current, peak_torque : float
+        Of the motor in the step of the demanded amplitude, once it has begun [A], [N m]; nan where there is no current.
+    """
+
+    corner: str
+    verdicts: dict[str, str]
+    cycle: float
+    standing_error: float
+    followed: float
+    overshoot: float
+    peak_current: float
+    peak_torque: float
+
+    def hunts(self, factor: float) -> bool:
+        """Whether a run with this factor on breakaway friction does not come to rest."""
+        return any(verdict != REST for name, verdict in self.verdicts.items() if name.endswith(_label(factor)))
+
+
+def _label(factor: float) -> str:
+    return f"{factor:.4g} breakaway"
+
+
+class Bench:
+    """Runs trials of one actuator; another process builds its own model.
+
+    Parameters
+    ----------
+    plant : Actuator
+        What is tried.
+    """
+
+    def __init__(self, plant: Actuator) -> None:
+        self.plant, self.stream = plant, SineStream(plant=plant)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"plant": replace(self.plant)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(state["plant"])
+
+    def __call__(self, trial: Trial) -> dict[str, Any]:
+        """Verdict and numbers of a step, or gain of a sine."""
+        if trial.kind == SINE:
+            found = self.stream.measure(
+                SinePoint(amplitude=trial.size, frequency=trial.frequency, parameters=trial.parameters)
+            )
+            value = complex(*found.harmonics[0][1]) / trial.size
+            return {"followed": abs(value), "settled": found.settled}
+        try:
+            run, hunting = decide(
+                self.plant,
+                DURATION,
+                inputs={"reference": Step(time=BEFORE, after=trial.size)},
+                longest=LONGEST,
+                parameters=trial.parameters,
+                resolution=RESOLUTION,
+            )
+        except SimulationError as error:
+            return {"verdict": "failed", "reason": str(error)}
+        after = run.t >= BEFORE
+        current = run["current"][after] if "current" in run.signals else np.array([math.nan])
+        return {
+            "verdict": hunting.verdict,
+            "reason": hunting.reason,
+            "amplitude": hunting.amplitude_rad if hunting.cycles else 0.0,
+            "error": abs(float(run["position_error"][-1])) if hunting.verdict == REST else 0.0,
+            "overshoot": float(np.max(run["load_angle"])) / trial.size - 1,
+            "peak_current": float(abs(current).max()),
+            "peak_torque": float(abs(run["motor_torque"][after]).max()),
+        }
+
+
+def step_trials(
+    corner: Corner, design: Mapping[str, float], demand: Demand, defaults: Mapping[str, float], factor: float
+) -> dict[str, Trial]:
+    """Steps of all sizes in a corner, with a factor on breakaway friction; that is never below sliding friction."""
+    parameters = corner.parameters | dict(design)
+    values = dict(defaults) | parameters
+    sticky = {}
+    for name in (name for name in values if name.endswith(tuple(BREAKAWAY))):
+        sliding = sliding_of(name, values)
+        sticky[name] = max(factor * values[name], values[sliding] if sliding else 0.0)
+    return {f"x{part:g}, {_label(factor)}": Trial(STEP, parameters | sticky, part * demand.sine) for part in STEPS}
+
+
+def trials(
+    corner: Corner, design: Mapping[str, float], demand: Demand, defaults: Mapping[str, float]
+) -> dict[str, Trial]:
+    """What is simulated in a corner, by what it is called."""
+    found = {}
+    for factor in dict.fromkeys((1.0, demand.stiction_margin)):
+        found |= step_trials(corner, design, demand, defaults, factor)
+    found[SINE] = Trial(SINE, corner.parameters | dict(design), demand.sine, demand.bandwidth)
+    return found
+
+
+def check_corners(  # noqa: PLR0913 - what is checked, and how it is run
+    plant: Actuator,
+    corners: Sequence[Corner],
+    design: Mapping[str, float],
+    demand: Demand,
+    *,
+    done: MutableMapping[str, dict[str, Any]] | None = None,
+    workers: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[CornerCheck]:
+    """Simulate a design in every corner.
+
+    Parameters
+    ----------
+    plant : Actuator
+        With all parameters of the design.
+    corners : sequence of Corner
+        Where.
+    design : mapping of str to float
+        Gains by name.
+    demand : Demand
+        Amplitude, bandwidth and stiction margin.
+    done, workers, progress
+        As for `sweep`.
+    """
+    defaults, model = defaults_of(plant.system().parameters), repr(plant)
+    wanted = {corner.name: trials(corner, design, demand, defaults) for corner in corners}
+    keys = {
+        (corner, name): fingerprint([model, *trial])
+        for corner, named in wanted.items()
+        for name, trial in named.items()
+    }
+    points = {keys[corner, name]: trial for corner, named in wanted.items() for name, trial in named.items()}
+    results = sweep(Bench(plant), points, done=done, workers=workers, progress=progress)
+    return [_summed(corner, {name: results[keys[corner, name]] for name in named}) for corner, named in wanted.items()]
+
+
+def _summed(corner: str, found: Mapping[str, dict[str, Any]]) -> CornerCheck:
+    steps = {name: result for name, result in found.items() if name != SINE}
+    plain = [result for name, result in steps.items() if name.endswith(_label(1.0))]
+    own = steps[f"x1, {_label(1.0)}"]
+    return CornerCheck(
+        corner=corner,
+        verdicts={name: result["verdict"] for name, result in steps.items()},
+        cycle=max(result.get("amplitude", 0.0) for result in plain),
+        standing_error=max(result.get("error", 0.0) for result in steps.values()),
+        followed=found[SINE]["followed"],
+        overshoot=own.get("overshoot", math.nan),
+        peak_current=own.get("peak_current", math.nan),
+        peak_torque=own.get("peak_torque", math.nan),
+    )

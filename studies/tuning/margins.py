@@ -1,0 +1,89 @@
+"""Gain, phase and delay margins of a loop with their exact derivatives by the gains."""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from actuator.linear.gain_models import Response
+from studies.tuning.models import Curves
+
+NONE = math.log(100.0)  # |ln| of a gain margin where there is no crossing
+NOTHING = 1e-6  # loop gain below which nothing passes
+NEWTON = 30  # steps; where one leaves its interval, that is halved instead
+MISSED = 1e-6  # what a crossing may be missed by: one that is not there is a jump between loci
+
+
+class Room(NamedTuple):
+    """How far from instability a loop is in one respect; with the derivatives by the gains."""
+
+    size: float
+    slopes: np.ndarray
+
+
+def gain_margin(curves: Curves, at: str) -> Room:
+    """|ln| of the factor on the gain, up or down, that makes the loop unstable, the nearest."""
+    frequencies, values = curves.frequencies(at), curves.loop(at)
+    best = Room(NONE, np.zeros(len(curves.model.gains)))
+    crosses = (np.imag(values[:-1]) * np.imag(values[1:]) < 0) & (np.real(values[:-1]) < -NOTHING)
+    found = [_refined(curves, at, frequencies[k : k + 2], _real)[1] for k in np.flatnonzero(crosses).tolist()]
+    crossings = [(each, False) for each in found if abs(_real(each)[0]) < MISSED * abs(each.value[0])]
+    if curves.sampled:  # the loop is real at half the rate of its signal, and mirrored beyond
+        crossings.append((curves.model.loop(at, [frequencies[-1]]), True))
+    for response, fixed in crossings:
+        level = np.real(response.value[0])
+        if level > -NOTHING:
+            continue
+        along = 0.0 if fixed else np.imag(response.slopes[0]) / np.imag(response.by_frequency[0])
+        slopes = (np.real(response.slopes[0]) - np.real(response.by_frequency[0]) * along) / level
+        size = math.log(-level)
+        if abs(size) < best.size:
+            best = Room(abs(size), math.copysign(1.0, size) * slopes)
+    return best
+
+
+def phase_and_delay_margin(curves: Curves, at: str) -> tuple[Room, Room]:
+    """The smallest lag [rad] and delay [s] that make the loop unstable, negative where it is."""
+    frequencies, values = curves.frequencies(at), curves.loop(at)
+    phase = delay = Room(math.pi, np.zeros(len(curves.model.gains)))
+    for k in np.flatnonzero((abs(values[:-1]) - 1) * (abs(values[1:]) - 1) < 0).tolist():
+        w, found = _refined(curves, at, frequencies[k : k + 2], _unity)
+        value = found.value[0]
+        if abs(abs(value) - 1) > MISSED:
+            continue
+        lag = (math.pi + float(np.angle(value)) + math.pi) % (2 * math.pi) - math.pi
+        change, by_frequency = found.slopes[0] / value, found.by_frequency[0] / value
+        shift = -np.real(change) / np.real(by_frequency)  # of the crossing
+        slopes = np.imag(change) + np.imag(by_frequency) * shift
+        if lag < phase.size:
+            phase = Room(lag, slopes)
+        if lag / w < delay.size:
+            delay = Room(lag / w, (slopes - lag / w * shift) / w)
+    return phase, delay
+
+
+def _real(response: Response) -> tuple[float, float]:
+    return np.imag(response.value[0]), np.imag(response.by_frequency[0])
+
+
+def _unity(response: Response) -> tuple[float, float]:
+    value = response.value[0]
+    return abs(value) - 1, np.real(response.by_frequency[0] * value.conj()) / abs(value)
+
+
+def _refined(
+    curves: Curves, at: str, interval: np.ndarray, crossing: Callable[[Response], tuple[float, float]]
+) -> tuple[float, Response]:
+    """Where a function of the loop crosses zero in an interval, and the loop there, by Newton's method."""
+    low, high = map(float, interval)
+    start = crossing(curves.model.loop(at, [low]))[0]
+    w = math.sqrt(low * high)
+    for _ in range(NEWTON):
+        value, slope = crossing(curves.model.loop(at, [w]))
+        low, high = (w, high) if value * start > 0 else (low, w)
+        after = w - value / slope if slope else w
+        w, before = (after if low <= after <= high else (low + high) / 2), w
+        if abs(w - before) < 1e-12 * w:  # noqa: PLR2004 - rounding
+            break
+    return w, curves.model.loop(at, [w])

@@ -1,0 +1,161 @@
+"""What is tuned: the gains of a cascade or of a PID, their start in closed form, and the dead band of the integral."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+from actuator.actuator import Actuator
+from actuator.hybrid import HybridSystem
+from actuator.ledger import PREFIX
+from actuator.linear.sampled import without_counts
+from actuator.parameters import Parameter
+from controllers.cascade import Cascade
+from controllers.integral import IntegralRemedies
+from controllers.pid import PI, PID, P
+from studies.specification import Demand
+
+POSITION, SPEED, INTEGRAL = "controller.position.gain", "controller.speed.proportional", "controller.speed.integral"
+CASCADE_GAINS = (POSITION, SPEED, INTEGRAL)
+PID_GAINS = tuple(f"controller.{name}" for name in ("proportional", "integral", "derivative", "filter_time"))
+ROOM = 1.5  # bandwidth of the position loop at the start, over the demanded one
+APART = 4.0  # speed bandwidth over that of the position loop, and over the rate of the integral
+ABOVE = 10.0  # rate of the derivative's filter over the bandwidth, at the start
+
+
+class NotTunable(ValueError):
+    """No gains meet the demands, or the actuator is not one that can be tuned here."""
+
+
+class Effort(NamedTuple):
+    """What a demand bounds in a step: a measure, the output it is of, the limit and its unit."""
+
+    name: str
+    output: str
+    limit: float
+    unit: str
+
+
+def tunable(plant: Actuator) -> Cascade | PID:
+    """The controller of an actuator; NotTunable with the reason where it is not one that can be tuned here."""
+    controller = plant.controller
+    if isinstance(controller, PID):
+        return controller
+    if not isinstance(controller, Cascade):
+        raise NotTunable(f"{plant.name}: tuning takes a Cascade or a PID, and there is no controller")
+    if not isinstance(controller.position, P):
+        raise NotTunable(
+            f"{plant.name}: tuning takes a Cascade with a P position law, not {type(controller.position).__name__}: "
+            "of two integrals in a row the outer one would hunt where the inner one has its dead band"
+        )
+    return controller
+
+
+def gains_of(plant: Actuator) -> tuple[str, ...]:
+    """Gains that can be tuned."""
+    controller = tunable(plant)
+    if isinstance(controller, Cascade):
+        return CASCADE_GAINS
+    return PID_GAINS if controller.filter_time is not None else PID_GAINS[:-1]
+
+
+def dead_band_of(plant: Actuator) -> str:
+    """Name of the dead band of the integral."""
+    return f"controller.{'speed.' if isinstance(tunable(plant), Cascade) else ''}remedies.dead_band"
+
+
+def loops_of(system: HybridSystem) -> tuple[str, str]:
+    """Signals at which margins are demanded: of the outer loop, and the torque that all of them ask for."""
+    inputs = [quantity.name for quantity in system.inputs]
+    return ("speed_reference" if f"{PREFIX}speed_reference" in inputs else "position", "torque_reference")
+
+
+def efforts_of(demand: Demand, system: HybridSystem) -> list[Effort]:
+    """What is demanded of current and torque in a step.
+
+    Raises
+    ------
+    NotTunable
+        For the current of a motor that has none.
+    """
+    found = []
+    if demand.peak_current is not None:
+        if "current" not in [quantity.name for quantity in system.outputs]:
+            raise NotTunable(f"{system.name}: its motor has no current; demand a peak_torque instead of a peak_current")
+        found.append(Effort("peak current", "current", demand.peak_current, "A"))
+    if demand.peak_torque is not None:
+        found.append(Effort("peak torque", "motor_torque", demand.peak_torque, "N m"))
+    return found
+
+
+def inertia_at_motor(plant: Actuator) -> float:
+    """Inertia of motor, gear and load that the motor turns [kg m^2]."""
+    turns = {name: float(value) for name, value in plant.gear.travel().items()}
+    own = turns[plant.gear.input]
+    total = sum(shaft.inertia * (turns[name] / own) ** 2 for name, shaft in plant.gear.shafts.items())
+    return (
+        total
+        + getattr(plant.motor, "inertia", 0.0)
+        + plant.load.inertia_at(0.0) * (turns[plant.gear.output] / own) ** 2
+    )
+
+
+def closed_form(plant: Actuator, demand: Demand) -> dict[str, float]:
+    """Gains by loop shaping on the inertia that the motor turns.
+
+    Of a cascade bandwidths that are apart by a factor of four; of a PID three poles at one rate, and the filter of its
+    derivative a decade above.
+    """
+    rate, inertia = 2 * math.pi * demand.bandwidth * ROOM, inertia_at_motor(plant)
+    if isinstance(tunable(plant), Cascade):
+        law = PI.for_inertia(inertia=inertia, bandwidth=APART * rate, integral_bandwidth=rate)
+        return {POSITION: rate, SPEED: law.proportional, INTEGRAL: law.integral}
+    pid = PID.for_inertia(inertia=inertia * plant.gear.ratio() ** 2, bandwidth=rate, filter_time=1 / (ABOVE * rate))
+    return {name: getattr(pid, name.removeprefix("controller.")) for name in gains_of(plant)}
+
+
+# -- the dead band ----------------------------------------------------------------------------------------
+
+
+def for_linear_models(plant: Actuator) -> Actuator:
+    """With the integral at work everywhere, and sensors that read between their counts."""
+
+    def changed(remedies: IntegralRemedies | None) -> IntegralRemedies | None:
+        return None if remedies is None else replace(remedies, dead_band=None)
+
+    return without_counts(_with_remedies(plant, changed))
+
+
+def dead_banded(plant: Actuator) -> Actuator:
+    """With a dead band of the integral, of width zero where it had none."""
+
+    def changed(remedies: IntegralRemedies | None) -> IntegralRemedies:
+        kept = remedies or IntegralRemedies()
+        return replace(kept, dead_band=kept.dead_band or 0.0)
+
+    return _with_remedies(plant, changed)
+
+
+def _with_remedies(plant: Actuator, changed: Callable[[IntegralRemedies | None], IntegralRemedies | None]) -> Actuator:
+    controller = tunable(plant)
+    if isinstance(controller, PID):
+        return replace(plant, controller=replace(controller, remedies=changed(controller.remedies)))
+    speed = replace(controller.speed, remedies=changed(controller.speed.remedies))
+    return replace(plant, controller=replace(controller, speed=speed))
+
+
+def with_dead_band(plant: Actuator, gains: Mapping[str, float], error: float) -> dict[str, float]:
+    """Gains and the dead band that leaves this error [rad] at the load.
+
+    A PID integrates the error itself, a cascade that of the motor speed [rad/s], ratio * position gain times as large.
+    """
+    width = error
+    if isinstance(tunable(plant), Cascade):
+        default = defaults_of(plant.system().parameters)[POSITION]
+        width *= abs(plant.gear.ratio()) * gains.get(POSITION, default)
+    return {**gains, dead_band_of(plant): width}
+
+
+def defaults_of(parameters: tuple[Parameter, ...]) -> dict[str, float]:
+    """Values by name."""
+    return {parameter.name: float(parameter.default) for parameter in parameters}

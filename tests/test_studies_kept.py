@@ -1,0 +1,201 @@
+"""What studies keep: the file, the parts of a study, and the processes that make them.
+
+Oracles: what was put in comes out, to the last bit, from another mapping over the same file; a file cut anywhere, as a
+kill leaves it, gives the lines that are whole; another program's file gives nothing; processes that are told to sleep
+for an hour are gone when their pool is left.
+"""
+
+import json
+import math
+import multiprocessing
+import os
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import actuator
+from actuator.response.processes import processes
+from studies.kept import FILE, PACKAGES, Kept, kept_in, program, source
+from studies.stages import KeepingExecutor, Missing, Stages
+
+# -- the file -----------------------------------------------------------------------------------------------
+
+
+@given(lines=st.integers(0, 4), cut=st.integers(0, 200))
+def test_a_file_cut_anywhere_gives_its_whole_lines_and_can_be_gone_on_with(tmp_path_factory, lines, cut):
+    path = tmp_path_factory.mktemp("cut") / FILE
+    kept = Kept(path)
+    for k in range(lines):
+        kept[str(k)] = {"x": k / 3}
+    whole = path.read_bytes() if path.exists() else b""
+    path.write_bytes(whole[: max(0, len(whole) - cut)])
+    left = max(0, path.read_bytes().count(b"\n") - 1)
+    again = Kept(path)
+    assert dict(again) == {str(k): {"x": k / 3} for k in range(left)}
+    again["new"] = {"x": math.inf}
+    assert dict(Kept(path)) == dict(again)
+    assert len(again) == left + 1
+
+
+def test_what_another_program_found_is_not_used_and_does_not_pile_up(tmp_path):
+    path = tmp_path / FILE
+    for version in ("one", "two", "three"):
+        kept = Kept(path, by=version)
+        assert not kept
+        kept["a"] = {"x": version}
+    assert [json.loads(line) for line in path.read_text().splitlines()] == [
+        {"program": "three"},
+        {"key": "a", "result": {"x": "three"}},
+    ]
+    assert not Kept(path)
+
+
+def test_looking_at_another_programs_file_leaves_it_as_it_is(tmp_path):
+    path = tmp_path / FILE
+    Kept(path, by="long work")["a"] = {"x": 1.0}
+    assert not Kept(path)
+    assert Kept(path, by="long work")["a"] == {"x": 1.0}
+
+
+def test_every_study_keeps_in_the_same_file(tmp_path):
+    kept = kept_in(tmp_path / "a" / "b")
+    assert kept.path == tmp_path / "a" / "b" / FILE
+    assert list(kept.path.parent.iterdir()) == []  # nothing before there is a result
+
+
+def test_a_folder_that_cannot_be_written_is_told_before_the_work(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OSError):
+        kept_in(tmp_path / "file" / "out")
+
+
+# -- the program --------------------------------------------------------------------------------------------
+
+
+def test_the_program_is_the_text_in_all_folders_below(tmp_path):
+    room = tmp_path / "room"
+    room.mkdir()
+    (tmp_path / "a.py").write_text("a")
+    (room / "b.py").write_text("b")
+    (room / "notes.txt").write_text("no part of it")
+    before = source([tmp_path])
+    (room / "notes.txt").write_text("still none")
+    assert source([tmp_path]) == before
+    (room / "b.py").write_text("c")
+    assert source([tmp_path]) != before
+    (room / "b.py").rename(room / "c.py")
+    (room / "c.py").write_text("b")
+    assert source([tmp_path]) != before
+
+
+def test_the_program_has_its_rooms():
+    root = Path(actuator.__file__).parent.parent
+    assert all((root / package).is_dir() for package in PACKAGES)
+    whole = source([root / "actuator"])
+    assert whole != source(sorted(path for path in (root / "actuator").iterdir() if path.is_dir()))
+    assert program() == program() and len(program()) == 16
+
+
+# -- parts --------------------------------------------------------------------------------------------------
+
+
+class Event(NamedTuple):
+    time: float
+    modes: tuple[int, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Part:
+    value: float
+    values: np.ndarray
+    number: complex
+    events: tuple[Event, ...]
+    image: bytes
+    other: "Part | None" = None
+
+
+def part(**changes):
+    given = {
+        "value": 0.1 + 0.2,
+        "values": np.array([1 + 1j / 3, math.inf]),
+        "number": complex(math.pi, -1 / 7),
+        "events": (Event(math.nan, (1, 0)),),
+        "image": bytes(range(256)),
+    }
+    return Part(**(given | changes))
+
+
+def test_a_part_comes_back_as_it_was(tmp_path):
+    made = part(other=part(values=np.array([np.nextafter(1, 2)])))
+    first = Stages(Kept(tmp_path / FILE), "case").get("part", Part, lambda: made)
+    stages = Stages(Kept(tmp_path / FILE), "case")
+    again = stages.get("part", Part, lambda: pytest.fail("made again"))
+    assert stages.taken == ["part"]
+    for found in (first, again):
+        assert repr(found) == repr(made)
+        np.testing.assert_array_equal(found.values, made.values)
+        assert found.values.dtype == complex and found.other.values.dtype == float
+
+
+def test_a_part_of_another_case_is_made_anew(tmp_path):
+    kept = Kept(tmp_path / FILE)
+    Stages(kept, "one").keep("part", 1.0)
+    stages = Stages(kept, "two")
+    assert stages.get("part", float, lambda: 2.0) == 2.0
+    assert stages.taken == []
+    assert Stages(kept, "one").read("part", float) == 1.0
+
+
+def test_a_failure_is_kept_like_a_result_and_others_go_through(tmp_path):
+    def fails():
+        raise ValueError("no such cycle")
+
+    for make in (fails, lambda: pytest.fail("made again")):
+        with pytest.raises(Missing, match="no such cycle"):
+            Stages(Kept(tmp_path / FILE)).get("part", float, make, failures=(ValueError,))
+    with pytest.raises(ValueError, match="no such cycle"):
+        Stages(Kept(tmp_path / FILE)).get("another", float, fails, failures=(KeyError,))
+    assert "another" not in Stages(Kept(tmp_path / FILE))
+
+
+def test_work_of_an_executor_is_kept_as_it_comes_even_where_nobody_asks_for_it(tmp_path):
+    done = []
+
+    def work(item):
+        done.append(item)
+        if item == 3:
+            raise ValueError("three")
+        return item / 2
+
+    for items, new in (([1, 2], [1, 2]), ([1, 2, 3], [3]), ([1, 2, 4], [4])):
+        done.clear()
+        stages = Stages(Kept(tmp_path / FILE), "case")
+        with ThreadPoolExecutor(1) as pool:
+            found = KeepingExecutor(pool, stages, "half", float).map(work, items)
+        assert done == new
+        if 3 in items:
+            with pytest.raises(ValueError, match="three"):
+                list(found)
+        else:
+            assert list(found) == [item / 2 for item in items]
+
+
+# -- processes ----------------------------------------------------------------------------------------------
+
+
+def test_processes_end_in_the_middle_of_their_work_where_the_pool_is_left_by_an_exception():
+    with pytest.raises(KeyboardInterrupt), processes(1) as pool:
+        pid = pool.submit(os.getpid).result()
+        assert pid in [child.pid for child in multiprocessing.active_children()]
+        pool.submit(time.sleep, 3600)
+        raise KeyboardInterrupt
+    assert pid not in [child.pid for child in multiprocessing.active_children()]
+    with pytest.raises(ProcessLookupError):
+        os.kill(pid, 0)

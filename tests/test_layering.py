@@ -34,18 +34,24 @@ def test_imports_go_in_one_direction(file):
     assert ours <= MAY_IMPORT[file.parts[0]]
 
 
-# rooms of the actuator, each may enter itself and those before it; what stands beside them puts an actuator together
-ROOMS = ("parts", "simulation", "linear", "hunting", "response")
+# each room may enter itself and those before it, in its own package; what stands beside them enters the room named last
+ROOMS = {
+    "actuator": (("parts", "simulation", "linear", "hunting", "response"), "parts"),
+    "studies": (("hunting", "tuning", "frequency", "checks"), None),
+}
+OPEN = ("__init__.py", "__main__.py")  # bring all together
 
 
-@pytest.mark.parametrize("file", [file for file in FILES if file.parts[0] == "actuator"], ids=str)
-def test_rooms_of_the_actuator_are_entered_in_one_direction(file):
-    if file.name == "__init__.py":
+@pytest.mark.parametrize("file", [file for file in FILES if file.parts[0] in ROOMS], ids=str)
+def test_rooms_are_entered_in_one_direction(file):
+    if file.name in OPEN:
         return
-    own = ROOMS.index(file.parts[1]) if file.parts[1] in ROOMS else 0
+    package, room = file.parts[:2]
+    rooms, beside = ROOMS[package]
+    last = room if room in rooms else beside
     modules = {node.module or "" for node in ast.walk(parsed(file)) if isinstance(node, ast.ImportFrom)}
-    entered = {name.split(".")[1] for name in modules if name.startswith("actuator.")} & set(ROOMS)
-    assert entered <= set(ROOMS[: own + 1])
+    entered = {name.split(".")[1] for name in modules if name.startswith(f"{package}.")} & set(rooms)
+    assert entered <= set(rooms[: rooms.index(last) + 1] if last else ())
 
 
 @pytest.mark.parametrize("file", FILES, ids=str)

@@ -97,7 +97,7 @@ def test_every_corner_comes_with_every_bias_load():
 def tuning(tmp_path):
     """The result.json of a tuning."""
     path = tmp_path / "result.json"
-    path.write_text(json.dumps({"gains": {"tuned": GAINS}}))
+    path.write_text(json.dumps({"case": "aileron", "gains": {"tuned": GAINS}}))
     return path
 
 
@@ -119,8 +119,8 @@ def test_the_result_of_a_tuning_is_the_case_with_its_gains(name, tuning, tmp_pat
     ("text", "error", "message"),
     [
         ("{}", CaseError, "is no result.json of a tuning"),
-        ('{"gains": {"tuned": {"controller.gain": 1}}}', CaseError, "controller.gain is no parameter of aileron"),
-        ('{"gains": {"tuned": {"controller.position.gain": -1}}}', WrongRequest, "gain must be"),
+        ('{"case": "aileron", "gains": {"tuned": {"controller.gain": 1}}}', CaseError, "controller.gain is no parameter of aileron"),
+        ('{"case": "aileron", "gains": {"tuned": {"controller.position.gain": -1}}}', WrongRequest, "gain must be"),
     ],
 )
 def test_what_is_no_tuning_is_refused(text, error, message, tuning):

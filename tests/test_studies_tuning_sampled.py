@@ -14,6 +14,7 @@ import pytest
 from actuator import Actuator, AngleSensor, CurrentSource, Load, Sensors, linearize, loop_transfer, trim
 from actuator.linear.gain_models import gain_model
 from actuator.linear.lifted_margins import lifted_margins
+from actuator.linear.sampled_gains import sampled_gain_model
 from controllers import Cascade, Sampling
 from controllers.pid import PI, P
 from gear import Bearing, Shaft, Transmission
@@ -24,7 +25,6 @@ from studies.tuning.margins import gain_margin, phase_and_delay_margin
 from studies.tuning.measures import measures
 from studies.tuning.models import curves_at
 from studies.tuning.plant import INTEGRAL, POSITION, SPEED, NotTunable, for_linear_models
-from studies.tuning.sampled_model import sampled_gain_model
 from studies.tuning.study import tune
 
 GAINS = {POSITION: 20.0, SPEED: 0.8, INTEGRAL: 8.0}

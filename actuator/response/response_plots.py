@@ -22,6 +22,7 @@ CLEAR = 0.9  # coherence from which a spectrum is shown over others
 MOST_BELOW = 80.0  # dB below the largest that is shown
 HARMONICS = (2, 3, 5)  # that get a panel of their own
 STILL = ": no motion"
+READING = "open points have not settled, a line ends where nothing moves"
 LEAST_PERCENT = 0.01  # of the fundamental that is shown
 
 
@@ -46,7 +47,7 @@ def plot_responses(
             for axes, values in ((gain, decibel(abs(response))), (phase, angle)):
                 axes.plot(hertz, values, ".", color=f"C{k + 1}", markersize=4, label=spectrum.label)
     output = str(where.get("output", measured.data.output.values[0])).replace("_", " ")
-    gain.set_title(f"{output} over {measured.given.replace('_', ' ')}; open points have not settled", fontsize="medium")
+    gain.set_title(f"{output} over {measured.given.replace('_', ' ')}; {READING}", fontsize="medium")
     figure.legend(
         *gain.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize="small", frameon=False
     )

@@ -7,8 +7,8 @@ from actuator.parameters import with_values
 from studies.cases import Case, built_in, load_case
 from studies.files import CaseError
 from studies.frequency.corners import WrongRequest
-from studies.tuning.robustness_study import gains_of
 from studies.tuning.study import dead_banded
+from studies.tuning.tuned_gains import tuned_gains
 
 TUNING = ".json"  # ending of the result of a tuning
 
@@ -50,10 +50,11 @@ def second(name: str, first: Case) -> Case:
     label = f"{first.name}-tuned"
     try:
         plant = dead_banded(first.actuator)
-        controller = with_values(plant.controller, "controller", gains_of(Path(name), plant))
+        gains = tuned_gains(Path(name), plant)
+        controller = with_values(plant.controller, "controller", gains.values)
     except CaseError:
         raise
     except ValueError as error:  # an actuator that is not one to be tuned, or a gain that breaks a rule
         raise WrongRequest(f"{name}: {error}") from None
     actuator = replace(first.actuator, controller=controller, name=label)
-    return replace(first, name=label, title=f"{first.title}, tuned ({name})", actuator=actuator)
+    return replace(first, name=label, title=f"{first.title}, {gains.words}", actuator=actuator)

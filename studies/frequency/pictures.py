@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from actuator import Spectrum
-from actuator.response.response_plots import STILL, draw_responses, plain_hertz
+from actuator.response.response_plots import READING, STILL, draw_responses, plain_hertz
 from studies.frequency.corners import Place
 from studies.frequency.mask import Mask, phase_of
 from studies.frequency.study import Study
@@ -47,7 +47,7 @@ def plot_places(study: Study, places: Sequence[Place], mask: Mask, stroke: float
     panels[0, 0].set_ylim(max(min(low for low, _ in ends), LEAST_DB), max(high for _, high in ends))
     for axes in panels[:, 1:].flat:
         axes.set_ylabel("")
-    figure.suptitle("load angle over reference; open points have not settled", fontsize="medium")
+    figure.suptitle(f"load angle over reference; {READING}", fontsize="medium")
     _legend(figure, panels.flat)
     return figure
 
@@ -104,7 +104,8 @@ def plot_beside(studies: Sequence[Study], amplitudes: Sequence[float]) -> Figure
     for axes in (gain, phase):
         axes.grid(alpha=0.3, which="both")
     first = studies[0].words(next(iter(studies[0].checks)))
-    gain.set_title(f"load angle over reference, side by side{f'; {first}' if first else ''}", fontsize="medium")
+    place = f", {first}" if first else ""
+    gain.set_title(f"load angle over reference{place}; a line ends where nothing moves", fontsize="medium")
     figure.legend(
         *gain.get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize="small", frameon=False
     )

@@ -10,9 +10,9 @@ import numpy as np
 from actuator.ledger import PREFIX
 from actuator.linear.gain_models import GainModel, gain_model
 from actuator.linear.operating_point import OperatingPoint
+from actuator.linear.sampled_gain_model import SampledGainModel
+from actuator.linear.sampled_gains import sampled_gain_model
 from studies.tuning.plant import loops_of
-from studies.tuning.sampled import SampledGainModel
-from studies.tuning.sampled_model import sampled_gain_model
 
 FREQUENCIES = 2 * np.pi * np.logspace(-1.5, 3.5, 240)  # rad/s
 NYQUIST = 1 - 1e-3  # part of half a rate up to which what is sampled is looked at

@@ -2,7 +2,6 @@
 
 import csv
 import io
-import json
 import math
 from collections.abc import Callable, Mapping, MutableMapping
 from dataclasses import replace
@@ -23,6 +22,7 @@ from studies.tuning.check import SINE, STEP, Bench, Trial
 from studies.tuning.plant import defaults_of
 from studies.tuning.robustness import CONFIDENCE, Probability, Robustness, robustness
 from studies.tuning.study import dead_banded
+from studies.tuning.tuned_gains import tuned_gains
 
 STEPS = (0.1, 1.0)  # of the demanded amplitude
 SHOWN = 12  # parameters in the picture
@@ -66,26 +66,6 @@ def slow(result: Mapping[str, Any]) -> bool:
     return not result[FOLLOWED] >= 1 / math.sqrt(2)
 
 
-def gains_of(path: Path, plant: Actuator) -> dict[str, float]:
-    """Tuned gains from the result.json of a tuning.
-
-    Raises
-    ------
-    CaseError
-        Where it is none.
-    """
-    try:
-        gains = json.loads(path.read_text(encoding="utf-8"))["gains"]["tuned"]
-        found = {name: float(value) for name, value in gains.items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        raise CaseError(f"{path}: is no result.json of a tuning") from None
-    known = defaults_of(plant.system().parameters)
-    for name in found:
-        if name not in known:
-            raise CaseError(f"{path}: {name} is no parameter of {plant.name}")
-    return found
-
-
 def corner_named(specification: Specification, plant: Actuator, words: str) -> Corner:
     """The first corner whose name has these words; the first of all for none.
 
@@ -116,7 +96,8 @@ def robustness_study(  # noqa: PLR0913 - the study, and how it is run
     """Monte Carlo over the tolerances of a specification, for the case as it is or with the gains of a tuning."""
     plant = dead_banded(case.actuator)
     where = corner_named(specification, case.actuator, corner)
-    own = gains_of(gains, plant) if gains else {}
+    tuned = tuned_gains(gains, plant) if gains else None
+    own = tuned.values if tuned else {}
     nominal = defaults_of(plant.system().parameters) | where.parameters | own
     for tolerance in specification.tolerances:
         if not any(nominal[name] for name in matching(tolerance.parameter, nominal)):
@@ -134,7 +115,7 @@ def robustness_study(  # noqa: PLR0913 - the study, and how it is run
         workers=workers,
         progress=progress,
     )
-    about = f"{case.name}, {'gains of ' + str(gains) if gains else 'as it is'}, {where.name}"
+    about = f"{case.name}, {tuned.words if tuned else 'as it is'}, {where.name}"
     pictures = {"influences": _influences(found), "scatter": _scatter(found)}
     text = [about, *(f"probability of {name}: {in_words(each)}" for name, each in found.probabilities.items())]
     for measure, rows in found.influences.items():

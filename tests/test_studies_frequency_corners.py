@@ -119,7 +119,11 @@ def test_the_result_of_a_tuning_is_the_case_with_its_gains(name, tuning, tmp_pat
     ("text", "error", "message"),
     [
         ("{}", CaseError, "is no result.json of a tuning"),
-        ('{"case": "aileron", "gains": {"tuned": {"controller.gain": 1}}}', CaseError, "controller.gain is no parameter of aileron"),
+        (
+            '{"case": "aileron", "gains": {"tuned": {"controller.gain": 1}}}',
+            CaseError,
+            "controller.gain is no parameter of aileron",
+        ),
         ('{"case": "aileron", "gains": {"tuned": {"controller.position.gain": -1}}}', WrongRequest, "gain must be"),
     ],
 )

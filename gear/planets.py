@@ -92,7 +92,7 @@ def separate(gear: Transmission, *shafts: str) -> Transmission:
     Parameters
     ----------
     gear : Transmission
-        Of this module, with lumped planets and nothing but meshes on them.
+        Of `gear.arrangements`, with lumped planets and nothing but meshes on them.
     shafts : str
         Names of the planets' shafts; both of sets with short and long planets.
 

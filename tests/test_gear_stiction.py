@@ -6,7 +6,7 @@ import itertools
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from oracles import numbers
@@ -268,7 +268,15 @@ def test_two_bearings_and_the_mesh_between_them_break_away_together(torque, move
     assert list(decided(problem, redundant=True) % 2) == ([1, 0, 1] if moves else [0, 0, 0])
 
 
-@pytest.mark.parametrize("light", [1e-1, 1e-2])
+@pytest.mark.parametrize("light", [1e-1, 1e-3, 1e-6])
+def test_a_heavy_shaft_with_a_locked_light_one_before_it_holds_up_to_the_sum_of_both_limits(light):
+    """What the light one leaves free must not pass for a way to slip, or the heavy one's bearing gives way alone."""
+    for load, moves in ((0.6, False), (1.499, False), (1.501, True)):
+        problem = two_shafts(inertia=(light, 1.0), ratio=1.0, static=(1.0, 1e3, 0.5), outside=(0.0, load))
+        assert (abs(decided(problem, redundant=True)) == 1).any() == moves
+
+
+@pytest.mark.parametrize("light", [1e-1, 1e-2, 1e-4])
 def test_a_shaft_breaks_away_at_the_sum_of_both_limits_with_a_light_one_behind_it(light):
     """The regularization once held it up to 1e-8 of the ratio of inertias beyond that, overloaded."""
     for part, moves in ((1 - 3e-9 / light, False), (1 + 3e-9 / light, True)):
@@ -297,6 +305,14 @@ def test_motion_of_a_train_with_redundant_bearings_is_consistent(problem):
     assert (abs(acceleration[~slips]) <= 1e-7 * size).all()
     assert (acceleration[slips] * motion[slips] >= -1e-7 * size).all()
     assert (abs(force) <= problem.static * (1 + 1e-6)).all()
+
+
+@settings(deadline=None, max_examples=100)
+@given(problem=trains())
+def test_a_train_that_some_friction_holds_does_not_slip(problem):
+    nothing, fewer = np.zeros(len(problem.demand)), problem._replace(static=0.99 * problem.static)
+    assume(can_be_held(fewer, nothing))
+    assert not (abs(decided(problem, redundant=True)) == 1).any()
 
 
 def at_their_limits(rng):

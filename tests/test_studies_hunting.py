@@ -18,7 +18,7 @@ from studies.hunting.ends import along, crossings, ends, with_boundary
 from studies.hunting.map import LABELS, Axis, Plan, compute, dataset
 from studies.hunting.settings import Setting, meaning, parameters_of
 from studies.hunting.study import WrongPlan, plan_of
-from studies.hunting.study import map as maps
+from studies.hunting import map as maps
 from studies.kept import Kept
 from studies.stages import Stages
 

@@ -48,21 +48,24 @@ class Findings:
     page: Callable[[Mapping[str, str]], str] | None = None
 
     def save(self, folder: Path) -> list[Path]:
-        """Write all files into `folder` or, on a failure, none; those of an earlier result go. Returns their paths."""
+        """Write all files into `folder`, instead of those of an earlier result; returns their paths.
+
+        All of them or, on a failure, none: then the earlier ones are there again. Of what is killed in between there is
+        no result.json, which comes last.
+        """
         folder.mkdir(parents=True, exist_ok=True)
         for left in folder.glob(f"{WRITING}*"):  # by one that was killed
             shutil.rmtree(left, ignore_errors=True)
         earlier = _written_before(folder)
         with tempfile.TemporaryDirectory(dir=folder, prefix=WRITING) as hidden:
-            work = Path(hidden)
+            work, aside = Path(hidden) / "new", Path(hidden) / "old"
+            work.mkdir()
+            aside.mkdir()
             self._write(work)
             names = sorted([RESULT, *(path.name for path in work.iterdir())])
             result = json.dumps({**finite(self.result), "files": names}, indent=2, allow_nan=False)
             (work / RESULT).write_text(result + "\n")
-            for name in names:
-                os.replace(work / name, folder / name)
-        for name in earlier - set(names):
-            (folder / name).unlink(missing_ok=True)
+            _exchange(folder, work, aside, sorted(earlier | set(names), key=lambda name: (name == RESULT, name)))
         return [folder / name for name in names]
 
     def _write(self, folder: Path) -> None:
@@ -80,6 +83,30 @@ class Findings:
                 (folder / name).write_text(content, encoding="utf-8", newline="")
             else:
                 content(folder / name)
+
+
+def _exchange(folder: Path, new: Path, aside: Path, names: list[str]) -> None:
+    """Move files into a folder and what they replace aside; the last name is the first to go and the last to come.
+
+    A directory in the way stays, and is a failure.
+    """
+    moved: list[tuple[Path, Path]] = []
+
+    def move(source: Path, target: Path) -> None:
+        os.replace(source, target)
+        moved.append((source, target))
+
+    try:
+        for name in reversed(names):
+            if (folder / name).is_file():
+                move(folder / name, aside / name)
+        for name in names:
+            if (new / name).exists():
+                move(new / name, folder / name)
+    except BaseException:
+        for source, target in reversed(moved):
+            os.replace(target, source)
+        raise
 
 
 def _written_before(folder: Path) -> set[str]:

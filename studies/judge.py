@@ -36,7 +36,7 @@ from actuator.ledger import PREFIX
 from actuator.response.processes import processes
 from actuator.simulation.signals import piece_at
 from studies.cases import Case
-from studies.kept import model_of
+from studies.kept import actuator_of
 from studies.stages import CONVERTER, KeepingExecutor, Missing, Stages
 
 MODES = ("stuck", "forward", "backward")
@@ -111,8 +111,7 @@ class Judgment:
 
 def fingerprint_of(case: Case) -> str:
     """Of all in a case that a judgment depends on."""
-    parameters = {parameter.name: float(parameter.default) for parameter in case.actuator.system().parameters}
-    return model_of(parameters, repr((case.actuator, case.inputs, case.duration)))
+    return actuator_of(case.actuator, case.inputs, case.duration)
 
 
 def judge(

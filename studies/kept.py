@@ -14,7 +14,10 @@ from collections.abc import Iterable, Iterator, Mapping, MutableMapping
 from functools import cache
 from importlib import metadata, resources
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from actuator import Actuator
 
 FILE = "finished.jsonl"
 PACKAGES = ("gear", "controllers", "actuator", "studies")
@@ -110,3 +113,8 @@ def fingerprint(what: Any) -> str:
 def model_of(parameters: Mapping[str, float], words: str = "") -> str:
     """Of a model, by all its numbers."""
     return fingerprint([words, dict(parameters)])
+
+
+def actuator_of(actuator: "Actuator", *others: Any) -> str:
+    """Of an actuator, by all its parts, choices and numbers, and of what else a result depends on."""
+    return fingerprint([repr(actuator), *map(repr, others)])

@@ -19,6 +19,7 @@ from actuator import (
     Actuator,
     Gravity,
     Load,
+    SimulationError,
     SineStream,
     ThermalNetwork,
     ThermalNode,
@@ -34,6 +35,7 @@ from actuator import (
     trim,
 )
 from actuator.response.fourier import fourier
+from actuator.response.frequency_response import point_key
 from actuator.response.sine_stream import SinePoint
 from actuator.response.sweep import sweep
 from controllers import PID, Sampling
@@ -132,6 +134,12 @@ def test_the_threshold_is_breakaway_over_the_gain_of_the_stuck_loop(integral):
     assert found == pytest.approx(held_amplitude(0.5, integral), rel=1e-3)
 
 
+def test_where_nothing_could_stick_there_is_no_threshold():
+    plant = dataclasses.replace(servo(), gear=dataclasses.replace(servo().gear, bearings={}))
+    with pytest.raises(ValueError, match="actuator: has no contact that could stick, so no threshold"):
+        SineStream(plant=plant, compiled=False).threshold(SinePoint(amplitude=0.0, frequency=0.5), 1e-3, 1.0)
+
+
 @pytest.mark.parametrize(("low", "high", "message"), [(1e-4, 1e-3, "nothing slides"), (0.5, 1.0, "a contact slides")])
 def test_bounds_on_one_side_of_the_threshold_are_refused(low, high, message):
     stream = SineStream(plant=servo(sticks=True), compiled=False)
@@ -193,6 +201,23 @@ def test_the_distortion_of_dry_friction_is_that_of_a_square_wave():
     friction = found.select("distortion", output="gear.bearings.guide.friction").item()
     assert friction == pytest.approx(square, rel=0.02)
     assert found.select("distortion", output="load_angle").item() < 0.05 * square
+
+
+def test_a_place_is_chosen_by_its_number_up_to_rounding_and_no_other():
+    found = measured(servo(), amplitudes=[0.1, 0.2], frequencies=[1.0])
+    assert found.select(amplitude=0.2 * (1 + 1e-9)).item() == found.data.response.values[0, 0, 1, 0, 0]
+    for where, message in (
+        ({"amplitude": 0.15}, "no amplitude 0.15; there are 0.1, 0.2"),
+        ({"amplitude": 0.1, "load": 1.0}, "no load 1.0; there are 0.0"),
+        ({"amplitude": 0.1, "set": "cold"}, "no set 'cold'; there are ''"),
+    ):
+        with pytest.raises(KeyError, match=message):
+            found.select(**where)
+
+
+def test_a_fundamental_alone_says_nothing_of_distortion():
+    found = measured(servo(sticks=True), amplitudes=[0.2], frequencies=[1.0], harmonics=1)
+    assert found.data.moves.all() and math.isnan(found.data.distortion.item())
 
 
 def test_what_stands_still_has_no_distortion():
@@ -257,6 +282,29 @@ def test_another_parameter_is_another_point():
         sets = {"": {"gear.bearings.guide.viscous": value}}
         measured(servo(), amplitudes=[0.1], frequencies=[3.0], sets=sets, done=done)
     assert len(done) == 2
+
+
+def test_another_law_is_another_point_of_an_actuator_and_of_a_bare_system():
+    limited = dataclasses.replace(servo().controller, limit=50.0)
+    plants = [
+        dataclasses.replace(servo(period=period), controller=dataclasses.replace(limited, anti_windup=law))
+        for period in (None, 1e-2)
+        for law in ("back-calculation", "clamping", "conditional")
+    ]
+    point = SinePoint(amplitude=1.0, frequency=1.0)
+    for made in (plants, [plant.system() for plant in plants]):
+        assert len({point_key(SineStream(plant=plant), point) for plant in made}) == len(plants)
+    # each function counts alone, and how often a clock ticks; the same built again is the same
+    first, second = (plant.system() for plant in (plants[3], plants[4]))
+    others = [
+        dataclasses.replace(first, tick=second.tick),
+        dataclasses.replace(first, reset=plants[0].system().reset),
+        dataclasses.replace(first, clocks=tuple(clock._replace(every=2) for clock in first.clocks)),
+    ]
+    again = dataclasses.replace(plants[3]).system()
+    keys = [point_key(SineStream(plant=each), point) for each in (first, again, *others)]
+    assert keys[0] == keys[1]
+    assert len(set(keys)) == 1 + len(others)
 
 
 def square(value):
@@ -407,6 +455,16 @@ def test_the_picture_of_harmonics_has_a_panel_for_each_and_one_for_all():
     np.testing.assert_allclose(third, 100 * harmonics[:, 2] / harmonics[:, 0])
     words = [text.get_text() for text in figure.legends[0].get_texts()]
     assert words == ["0.0573 deg: no motion", "11.5 deg"]
+
+
+def test_what_failed_is_not_said_to_stand_still(monkeypatch):
+    def fails(self, point):
+        raise SimulationError("stuck", 0.0, {})
+
+    monkeypatch.setattr(SineStream, "_measured", fails)
+    found = measured(servo(sticks=True), amplitudes=[1e-3], frequencies=[0.5, 2.0])
+    words = [text.get_text() for text in found.plot().legends[0].get_texts()]
+    assert words == ["0.0573 deg: failed"]
 
 
 @pytest.mark.parametrize(

@@ -461,6 +461,20 @@ def test_poles_of_a_mass_on_a_spring_are_shared_by_its_angle_and_its_speed():
     assert pole.part == "mass"
 
 
+@pytest.mark.parametrize("integral", [0.0, INTEGRAL])
+def test_a_stuck_shaft_under_pid_has_the_pole_of_its_integral_alone(integral):
+    gear = Transmission(
+        shafts={"arm": Shaft(inertia=INERTIA)},
+        bearings={"arm": Bearing(shaft="arm", coulomb=1.0, breakaway=1.5)},
+        input="arm",
+        output="arm",
+    )
+    pid = PID(proportional=PROPORTIONAL, integral=integral, derivative=DERIVATIVE)
+    arm = Actuator(motor=TorqueSource(), gear=gear, controller=pid)
+    (pole,) = poles(trim(arm, "stuck"))
+    assert (pole.value, pole.parts) == (0, {"controller": 1.0})
+
+
 def test_poles_of_two_masses_far_apart_belong_to_their_masses():
     found = models()["forward, stuck bearings.load"].point
     (pole,) = poles(found)

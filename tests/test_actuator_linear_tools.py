@@ -5,6 +5,7 @@ so that nothing cancels exactly; the poles of the closed loop; python-control's 
 that rests on its spring, in the gap of a mesh.
 """
 
+import math
 from dataclasses import replace
 from functools import cache
 
@@ -14,7 +15,18 @@ import numpy as np
 import pytest
 from random_parts import draw
 
-from actuator import Actuator, Load, TorqueSource, disk_margin, loop_transfer, margins, poles, reduced, trim
+from actuator import (
+    Actuator,
+    Load,
+    TorqueSource,
+    disk_margin,
+    lifted_margins,
+    loop_transfer,
+    margins,
+    poles,
+    reduced,
+    trim,
+)
 from controllers import Sampling
 from gear import Shaft, Transmission
 from studies import load_case
@@ -85,6 +97,65 @@ def test_an_integrator_in_discrete_time_has_no_crossing_at_standstill():
 def test_what_a_loop_feeds_back_leaves_no_rounding_when_it_is_opened():
     values = loop_transfer(points()["continuous"], "torque_reference").A
     assert abs(values[values != 0]).min() > 1e-9 * abs(values).max() * np.finfo(float).eps
+
+
+def lagged(loop, *corners):
+    """The loop behind lags with these corners [rad/s]."""
+    for corner in corners:
+        loop = control.series(loop, control.ss(-corner, corner, 1, 0))
+    return loop
+
+
+def speed_loop(gain, corner, *lags):
+    """gain (s + corner)/s^2 behind lags."""
+    return lagged(control.ss(control.tf([gain, gain * corner], [1, 0, 0])), *lags)
+
+
+@pytest.mark.parametrize("slow", [1e-22, 1e-12, 1e-6])
+def test_integrators_that_rounding_moved_have_no_crossing(slow):
+    # -0.7/((s - w)(s + w)) is 0.7/w^2 at standstill, and its own negative everywhere
+    for sign in (1, -1):
+        loop = control.ss(np.array([[slow, 0], [1, -slow]]), np.eye(2, 1), np.array([[0, 0.7 * sign]]), 0)
+        assert margins(loop).phase_crossings == ()
+
+
+def test_what_passes_at_once_has_its_gain_margin_at_infinite_frequency():
+    # 1 - k (s/2 + 1)/(s + 3) = ((1 - k/2) s + 3 - k)/(s + 3): unstable from k = 2 on
+    found = margins(control.ss(control.tf([-0.5, -1.0], [1.0, 3.0])))
+    assert [crossing.frequency for crossing in found.phase_crossings] == [0.0, math.inf]
+    assert (found.gain, found.gain_frequency) == (pytest.approx(2.0, rel=1e-12), math.inf)
+    assert found.stable
+    for gain, stable in ((1.99, True), (2.01, False)):
+        assert margins(control.ss(control.tf([-0.5 * gain, -gain], [1.0, 3.0]))).stable == stable
+
+
+@pytest.mark.parametrize("damping", [3e-3, 3e-4, 1e-6])
+@pytest.mark.parametrize("at", [10.02, 500.0])
+def test_a_resonance_between_points_of_the_grid_is_crossed(damping, at):
+    # |L| = 1 where (w^2 - x)^2 + 4 d^2 w^2 x = g^2, x the square of the frequency
+    size = 3 * 2 * damping * at**2
+    loop = control.ss(control.tf([size], [1, 2 * damping * at, at**2]))
+    expected = np.roots([1, (4 * damping**2 - 2) * at**2, at**4 - size**2])
+    found = margins(loop)
+    np.testing.assert_allclose([c.frequency for c in found.gain_crossings], np.sort(np.sqrt(expected)), rtol=1e-9)
+    sampled = margins(control.sample_system(loop, 0.1 / at))
+    assert len(sampled.gain_crossings) == 2
+
+
+@pytest.mark.parametrize(("pole", "stable"), [(1e-4, False), (1e-7, False), (-1e-4, True)])
+@pytest.mark.parametrize("fast", [1e3, 1e6])
+def test_a_slow_unstable_pole_beside_a_fast_lag_is_unstable(pole, stable, fast):
+    # the integrator closes at this pole: s (s/fast + 1) = pole
+    assert margins(lagged(control.ss(0.0, 1.0, -pole, 0), fast)).stable == stable
+    sampled = control.ss(1.0, 1.0, -pole, 0, 1.0)
+    assert lifted_margins(sampled).stable == margins(sampled).stable == stable
+
+
+@pytest.mark.parametrize("signal", ["torque_reference", "voltage"])
+def test_a_pole_that_is_nearly_double_at_zero_is_not_unstable_by_rounding(signal):
+    _, design, _, drifting = draw(26)
+    stuck = trim(design, "stuck", inputs={"load_torque": 0.5}, drifting=drifting)
+    assert margins(loop_transfer(stuck, signal, drifting=drifting, minimal=True)).stable
 
 
 # -- python-control -----------------------------------------------------------------------------------------
@@ -182,6 +253,19 @@ def test_nothing_is_left_of_a_loop_through_a_stuck_gear():
     stuck = trim(load_case("aileron").actuator, "stuck", inputs={"reference": 0.1})
     loop = reduced(loop_transfer(stuck, "position", minimal=True))
     assert (loop.nstates, loop.D.item()) == (0, 0)
+
+
+@pytest.mark.parametrize(
+    ("gain", "corner", "lags"),
+    [(60.0, 0.1, (1e4, 1e6)), (60.0, 0.01, (1e6,)), (100.0, 0.01, (2e5,)), (60.0, 0.1, (1e4,))],
+)
+def test_an_integrator_beside_a_lag_at_a_million_is_kept(gain, corner, lags):
+    loop = reduced(in_other_units(speed_loop(gain, corner, *lags)))
+    assert loop.nstates == 2 + len(lags)
+    s = 1j * np.logspace(-2, 4, 13)
+    expected = gain * (s + corner) / s**2 / np.prod([s / lag + 1 for lag in lags], axis=0)
+    np.testing.assert_allclose(loop(s), expected, rtol=1e-2)
+    assert margins(loop).lower_gain == 0
 
 
 def test_fast_poles_become_a_lag():

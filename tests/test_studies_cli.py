@@ -6,6 +6,7 @@ two built-in cases, of which one hunts and one comes to rest; HTML that needs no
 
 import json
 import math
+import os
 import re
 import shutil
 from html.parser import HTMLParser
@@ -16,6 +17,7 @@ from click.testing import CliRunner
 
 from studies import built_in
 from studies.__main__ import COMMANDS, main
+from studies.findings import Findings
 
 MASS = """
 title = "Mass on a guide"
@@ -235,6 +237,31 @@ def test_files_of_an_earlier_result_go_and_others_stay(mass, case_file, tmp_path
     names = {each.name for each in out.iterdir()}
     assert {"mine.png", "finished.jsonl", "report.html", "step.png"} <= names
     assert names.isdisjoint({"causes.png", "remedies.png", "orbit.png", ".writing-killed"})
+
+
+def test_what_cannot_be_written_leaves_the_earlier_result_as_it_was(tmp_path):
+    def contents():
+        return {path.name: path.read_text() if path.is_file() else None for path in tmp_path.iterdir()}
+
+    Findings(pictures={}, result={"x": 1}, text=["one"], files={"a.csv": "1", "old.csv": "1"}).save(tmp_path)
+    (tmp_path / "margins.csv").mkdir()
+    before = contents()
+    later = Findings(pictures={}, result={"x": 2}, text=["two"], files={"a.csv": "2", "margins.csv": "2", "z.csv": "2"})
+    with pytest.raises(IsADirectoryError):
+        later.save(tmp_path)
+    assert contents() == before
+    (tmp_path / "margins.csv").rmdir()
+    later.save(tmp_path)
+    assert set(contents()) == {"a.csv", "margins.csv", "z.csv", "findings.txt", "result.json"}
+    assert contents()["a.csv"] == "2"
+
+
+def test_the_list_of_files_is_the_first_to_go_and_the_last_to_come(tmp_path, monkeypatch):
+    Findings(pictures={}, result={}, text=[], files={"z.csv": "1"}).save(tmp_path)
+    replace, moved = os.replace, []
+    monkeypatch.setattr("os.replace", lambda source, target: moved.append(source.name) or replace(source, target))
+    Findings(pictures={}, result={}, text=[], files={"z.csv": "2"}).save(tmp_path)
+    assert moved[0] == moved[-1] == "result.json" and len(moved) == 2 * 3
 
 
 def test_an_interrupted_benchmark_promises_nothing(monkeypatch):

@@ -7,18 +7,22 @@ kept or missed by it; a study that was killed finished without computing a point
 import csv
 import json
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import xarray
 from click.testing import CliRunner
 
-from actuator import SineStream
+from actuator import SimulationError, SineStream
 from studies.__main__ import main
+from studies.cases import load_case
 from studies.files import CaseError
 from studies.frequency.against import load_positioner
+from studies.frequency.bench import TESTS, BenchPlan
 from studies.frequency.corners import WrongRequest
 from studies.frequency.mask import Limit, checked, load_mask, phase_of
+from studies.frequency.page import _assumed
 from studies.frequency.plan import PARTS
 from studies.frequency.tables import write_netcdf
 
@@ -225,6 +229,73 @@ def test_a_killed_study_goes_on_where_it_stopped(folder, outcome, tmp_path, with
     assert rows == [row for row in before if not row.startswith("heavier") and f",{BIAS}," not in row]
 
 
+def test_what_failed_is_counted_and_not_said_to_stand_still(folder, outcome, tmp_path, without_pictures, monkeypatch):
+    (kept,) = (folder / "out").glob("finished.jsonl")
+    lines = kept.read_text().splitlines(keepends=True)
+    (tmp_path / kept.name).write_text("".join(line for line in lines if "at 2 Hz" not in line))
+    measured = SineStream._measured
+
+    def fails(self, point):
+        if self.given == "reference":
+            raise SimulationError("no modes", 0.0, {})
+        return measured(self, point)
+
+    monkeypatch.setattr(SineStream, "_measured", fails)
+    found = invoke(*options(folder), "--out", tmp_path)
+    assert found.exit_code == 0, found.output
+    words = "gain, from below, at 0.4 deg and 2 Hz, 1 of 3 simulations failed"
+    assert words in found.output and "mass: 1 of 3 sines have failed." in found.output
+    assert "nothing moves" not in found.output and "have not settled" not in found.output
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "1 of 3 simulations failed" in page and "no motion" not in page
+
+
+def test_a_mass_on_a_bearing_that_sticks_is_studied_and_what_it_has_is_told(folder, tmp_path, without_pictures):
+    (folder / "rubbing.toml").write_text(
+        'base = "mass.toml"\ntitle = "It rubs"\n[gear.bearings.guide]\nshaft = "mass"\ncoulomb = 0.5\nbreakaway = 0.8\n'
+        '[scenario.inputs.load_torque]\ntype = "Constant"\nvalue = 0.1\n',
+        encoding="utf-8",
+    )
+    case = folder / "rubbing.toml"
+    found = invoke(*options(folder), "--against", case, "--out", tmp_path)
+    assert found.exit_code == 0, found.output
+    page = " ".join((tmp_path / "report.html").read_text(encoding="utf-8").split())
+    # each case at its own operating point; each sentence of those that have the part
+    assert "mass, at reference 0: " in page and "rubbing, at reference 0, load_torque 0.1: " in page
+    assert "<li>Contacts truly stick, and slide off at their breakaway (rubbing).</li>" in page
+    for word in ("der Linden", "backlash", "inverter", "ecoupling", "winding", "sampled", "Corners and bias loads"):
+        assert word not in page, word
+    assert "mass, not done: mass: has no contact that could stick, so no threshold" in page
+    result = json.loads((tmp_path / "result.json").read_text())["cases"]
+    assert result["rubbing"]["tests"]["threshold"] and "reason" not in result["rubbing"]["tests"]["threshold"]
+
+
+def test_what_was_assumed_is_told_of_the_cases_that_have_the_part():
+    cases = [load_case(name) for name in ("aileron", "aileron-sampled")]
+    studies = [
+        SimpleNamespace(case=case, torque=5.0, stiffness={"unpowered": None}, checks={}, sets={}) for case in cases
+    ]
+    told = _assumed(SimpleNamespace(stroke=1.0), studies)
+    for sentence in (
+        "Averaged inverter.",
+        "Decoupling with the motor parameters given.",
+        "Teeth with backlash push and never pull.",
+        "Controllers in continuous time (aileron).",
+        "Controllers sampled (aileron-sampled).",
+        "Unpowered: the winding is open.",
+    ):
+        assert sentence in told
+    assert not [sentence for sentence in told if sentence.startswith(("Temperatures", "Corners"))]
+
+
+def test_it_is_said_up_to_which_torque_the_one_that_drives_back_was_sought():
+    actuator = load_case("aileron").actuator
+    plan = BenchPlan(stroke=1.0, torque=1.0, frequencies=(1.0,), sets={}, inputs={})
+    found = TESTS["back driving"](actuator, plan)
+    assert found.words == "forward and backward none was found up to 1 N m"
+    assert all(math.isinf(value) for value, _ in found.numbers.values())
+
+
 def test_a_corner_is_the_case_with_its_parameters_and_all_but_its_sines_are_there_already(
     folder, outcome, tmp_path, without_pictures, monkeypatch
 ):
@@ -257,6 +328,7 @@ def test_a_corner_is_the_case_with_its_parameters_and_all_but_its_sines_are_ther
 def test_a_second_case_and_a_record_are_laid_beside_it(folder, outcome):
     page = (folder / "out" / "report.html").read_text(encoding="utf-8")
     assert "A mass under a PID beside A heavier mass" in page and "Measured records" in page and "rig" in page
+    assert page.count("No bias. Fundamental of the load angle") == 2  # each says of which place it is
     assert "Shaded where they differ" in page and page.count('class="other"') == 1
     data = xarray.open_dataset(folder / "out" / "responses.nc", engine="scipy").isel(set=0, load=0, output=0)
     assert data.case.values.tolist() == ["mass", "heavier"]
@@ -291,9 +363,13 @@ def test_limits_are_straight_over_the_logarithm_of_frequency():
 
 def test_what_does_not_move_or_has_failed_keeps_to_no_lower_limit():
     limit = Limit(amplitude=0.1, frequencies=(1.0, 2.0), gain_low_db=(-60.0, -60.0), phase_low=(-9.0, -9.0))
-    for value, moves in ((1e-15, [False, True]), (math.nan, [True, True])):
+    for value, moves, words in (
+        (1e-15, [False, True], "nothing moves"),
+        (math.nan, [True, True], "1 of 2 simulations failed"),
+    ):
         checks = checked(limit, np.array([1.0, 2.0]), np.array([value, 1.0], complex), np.array(moves))
         assert [check.slack for check in checks] == [-math.inf, -math.inf]
+        assert [check.nothing for check in checks] == [words, words]
 
 
 def test_phase_starts_between_minus_270_and_90_deg_and_has_no_jumps():
@@ -339,7 +415,7 @@ WRONG = {
     "an unknown parameter": (("--corner", "motor.resistence=1"), "did you mean motor.resistance"),
     "a corner without a number": (("--corner", "motor.resistance"), "a corner is NAME=VALUE,NAME=VALUE with numbers"),
     "a bias load that is none": (("--bias", "nan"), "bias loads are numbers in N m, got nan"),
-    "a tuning that is none": (("--against", "nowhere.json"), "nowhere.json: is no result.json of a tuning"),
+    "a tuning that is none": (("--against", "nowhere.json"), "nowhere.json: cannot be read: No such file"),
     "no stroke": (("--stroke", 0), "Invalid value for '--stroke'"),
 }
 

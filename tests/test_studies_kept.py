@@ -11,7 +11,7 @@ import multiprocessing
 import os
 import time
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,8 +21,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import actuator
+from actuator import SinePoint, SineStream
+from actuator.response.frequency_response import point_key
 from actuator.response.processes import processes
-from studies.kept import FILE, PACKAGES, Kept, kept_in, program, source
+from studies.cases import load_case
+from studies.kept import FILE, PACKAGES, Kept, actuator_of, kept_in, program, source
 from studies.stages import KeepingExecutor, Missing, Stages
 
 # -- the file -----------------------------------------------------------------------------------------------
@@ -101,6 +104,27 @@ def test_the_program_has_its_rooms():
     whole = source([root / "actuator"])
     assert whole != source(sorted(path for path in (root / "actuator").iterdir() if path.is_dir()))
     assert program() == program() and len(program()) == 16
+
+
+# -- an actuator --------------------------------------------------------------------------------------------
+
+
+def test_an_actuator_is_told_by_its_choices_and_whole_numbers_too():
+    made = load_case("aileron").actuator
+    first, loops = made.gear.meshes["first"], made.controller
+    meshes = {**made.gear.meshes, "first": replace(first, pair=replace(first.pair, teeth_b=91))}
+    others = (
+        replace(made, gear=replace(made.gear, meshes=meshes)),
+        replace(made, motor=replace(made.motor, pole_pairs=5)),
+        replace(made, controller=replace(loops, speed=replace(loops.speed, anti_windup="clamping"))),
+        replace(made, controller=replace(loops, decoupling=False)),
+        replace(made, controller=replace(loops, feedback="motor")),
+    )
+    point = SinePoint(amplitude=1.0, frequency=1.0)
+    for name in (actuator_of, lambda each: point_key(SineStream(plant=each), point)):
+        assert len({name(each) for each in (made, *others)}) == 1 + len(others)
+        assert name(replace(made)) == name(made)
+    assert actuator_of(made, 1.0) != actuator_of(made)
 
 
 # -- parts --------------------------------------------------------------------------------------------------

@@ -57,6 +57,8 @@ def test_breakaway_is_never_below_sliding_friction():
     values = {"x.coulomb": 1.0, "x.breakaway": 1.1, "y.gap": 2.0}
     found = spread(values, [Tolerance(parameter="*.coulomb", size=0.5)], [1.4])
     assert found == {"x.coulomb": 1.4, "x.breakaway": 1.4}
+    stribeck = {"x.static": 1.1, "x.coulomb": 1.0}
+    assert spread(stribeck, [Tolerance(parameter="*.static", size=0.5)], [0.7]) == {"x.static": 1.0}
     with pytest.raises(KeyError, match="no parameter fits 'none'"):
         spread(values, [Tolerance(parameter="none", size=0.5)], [1.0])
 
@@ -164,10 +166,13 @@ def test_without_the_library_it_says_how_to_get_it(monkeypatch):
 
 
 def test_command_line_says_what_is_wrong_in_one_line(tmp_path):
+    other = tmp_path / "other.json"
+    other.write_text("{}")
     for arguments, says in (
         (["nothing"], "the built-in ones are"),
         (["aileron", "--corner", "hot"], "no corner has 'hot' in its name"),
-        (["aileron", "--gains", str(tmp_path / "none.json")], "is no result.json of a tuning"),
+        (["aileron", "--gains", str(tmp_path / "none.json")], "cannot be read: No such file"),
+        (["aileron", "--gains", str(other)], "is no result.json of a tuning"),
     ):
         ended = CliRunner().invoke(main, ["robustness", *arguments, "--out", str(tmp_path)])
         assert ended.exit_code == 2

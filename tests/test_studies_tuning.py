@@ -7,24 +7,30 @@ forms, with the multiplier of the demand that decides; difference quotients; `lo
 import json
 import math
 from dataclasses import replace
+from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from actuator import Actuator, CurrentSource, Load, TorqueSource, loop_transfer, margins, trim
-from actuator.linear.gain_models import gain_model
+from actuator.hunting.margins import at_least_sliding, sliding_of
+from actuator.linear.gain_models import Response, gain_model
 from controllers import Cascade, IntegralRemedies
 from controllers.pid import PI, PID, P
-from gear import Bearing, Shaft, Transmission
+from gear import Bearing, Shaft, Stribeck, Transmission
 from studies import CaseError, load_case
 from studies.__main__ import main
+from studies.hunting.settings import Setting, parameters_of
 from studies.kept import Kept, fingerprint
 from studies.specification import Change, Corner, Demand, Specification, Tuning, load_specification
-from studies.tuning.check import CornerCheck, check_corners
-from studies.tuning.corners import corner_modes
+from studies.tuning.check import SINE, Bench, CornerCheck, Trial, check_corners, step_trials
+from studies.tuning.corners import corner_modes, slides_as_it_breaks_away
 from studies.tuning.design import Active, design
+from studies.tuning.margins import phase_and_delay_margin
 from studies.tuning.measures import measures, worst
+from studies.tuning.models import curves_at
 from studies.tuning.plant import (
     INTEGRAL,
     POSITION,
@@ -36,7 +42,17 @@ from studies.tuning.plant import (
     inertia_at_motor,
     with_dead_band,
 )
-from studies.tuning.stiction import ACCURACY, MOST, Search, Seeker, StictionMargin, least, least_margin
+from studies.tuning.stiction import (
+    ACCURACY,
+    MOST,
+    Search,
+    Seeker,
+    StictionMargin,
+    least,
+    least_margin,
+    rungs,
+    stiction_margins,
+)
 from studies.tuning.study import shortfalls, tune, twins_of
 
 DEAD_BAND = "controller.speed.remedies.dead_band"
@@ -172,6 +188,52 @@ def test_margins_are_those_of_loop_margins(aileron):
         assert found[f"gain margin at {words}", "forward"] == pytest.approx(min(either_way, 100.0), rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("stable", "angle", "phase", "delay"),
+    [
+        (True, -170.0, 10.0, 10.0),
+        (True, 170.0, 10.0, 350.0),  # a lead is nearest: a delay takes the rest of the turn
+        (False, 170.0, -10.0, -10.0),
+        (False, -170.0, -10.0, -10.0),
+    ],
+)
+def test_phase_and_delay_of_an_integrator_that_is_turned(stable, angle, phase, delay):
+    # L = k/w exp(j angle): crosses at w = k, and d(lag/w)/dk = -lag/k^2
+    turned, gain, frequencies = np.exp(1j * math.radians(angle)), 3.0, np.logspace(-1, 2, 40)
+
+    def loop(at, w):
+        value = gain / np.asarray(w) * turned
+        return Response(value, (value / gain)[:, None], -value / np.asarray(w))
+
+    model = SimpleNamespace(loop=loop, stable=stable, gains=("k",))
+    curves = SimpleNamespace(
+        frequencies=lambda at: frequencies, loop=lambda at: loop(at, frequencies).value, model=model
+    )
+    lag, late = phase_and_delay_margin(curves, "x")
+    assert lag.size == pytest.approx(math.radians(phase))
+    assert lag.slopes == pytest.approx([0.0], abs=1e-9)
+    assert late.size == pytest.approx(math.radians(delay) / gain)
+    assert late.slopes == pytest.approx([-math.radians(delay) / gain**2])
+
+
+@pytest.mark.parametrize(("stable", "delay"), [(True, math.inf), (False, 0.0)])
+def test_without_a_crossing_no_delay_is_too_long(stable, delay):
+    frequencies = np.logspace(-1, 2, 40)
+    model = SimpleNamespace(stable=stable, gains=("k",))
+    curves = SimpleNamespace(frequencies=lambda at: frequencies, loop=lambda at: 0.1 / (1j + frequencies), model=model)
+    lag, late = phase_and_delay_margin(curves, "x")
+    assert (lag.size, late.size) == (math.copysign(math.pi, 1 if stable else -1), delay)
+
+
+def test_stiffness_is_the_least_of_all_frequencies(aileron):
+    gains = dict(zip(GAINS, (60.0, 0.0072, 0.36), strict=True))
+    modes = corner_modes(aileron, Corner("", {}), 1.0, gains)
+    found = worst(measures(modes, gains, demand(), {}, "forward"))
+    model = curves_at(modes.points["forward"], gains).model
+    sizes = abs(model.response("load_torque", "load_angle", np.logspace(0, 4, 20000)).value)
+    assert found["stiffness"].value == pytest.approx(1 / sizes.max(), rel=1e-5)
+
+
 # -- closed forms -----------------------------------------------------------------------------------------
 
 
@@ -203,6 +265,22 @@ def test_start_in_closed_form(aileron, one):
     assert start[POSITION] == pytest.approx(rate)
     assert start[SPEED] == pytest.approx(INERTIA * 5 * rate)
     assert start[INTEGRAL] == pytest.approx(INERTIA * 4 * rate * rate)
+
+
+def test_breakaway_is_never_below_the_sliding_friction_of_any_law(aileron):
+    law = Stribeck(static=0.12, coulomb=0.1, stribeck_speed=0.01)
+    mesh = replace(aileron.gear.meshes["first"], friction=law)
+    plant = replace(aileron, gear=replace(aileron.gear, meshes={**aileron.gear.meshes, "first": mesh}))
+    static, name = "gear.meshes.first.friction.static", "*.breakaway+*.static"
+    system = plant.system()
+    assert parameters_of(system, [Setting(name, 0.5)])[static] == 0.1
+    assert parameters_of(system, [Setting(name, 2.0)])[static] == 0.24
+    defaults = {p.name: float(p.default) for p in system.parameters}
+    steps = step_trials(Corner("", {}), {}, demand(), defaults, 0.5)
+    assert {trial.parameters[static] for trial in steps.values()} == {0.1}
+    assert slides_as_it_breaks_away(defaults, 2.0)["gear.meshes.first.friction.coulomb"] == 0.24
+    assert sliding_of(static, {static: 0.12}) is None  # a table's points are no parameters
+    assert at_least_sliding("controller.speed.integral", 0.1, defaults) == 0.1
 
 
 # -- a PID -----------------------------------------------------------------------------------------------
@@ -272,6 +350,7 @@ def check(**changed):
         "cycle": 0.0,
         "standing_error": 0.01,
         "followed": 0.9,
+        "settled": True,
         "overshoot": 0.1,
         "peak_current": 10.0,
         "peak_torque": 10.0,
@@ -287,6 +366,7 @@ def check(**changed):
         ({"peak_current": 120.0}, {"peak current": 1.02 * 1.2}),
         ({"standing_error": 0.11}, {"standing error": 1.02 * 1.1}),
         ({"followed": 0.5}, {"bandwidth": 1.02 / (math.sqrt(2) * 0.5)}),
+        ({"followed": 0.0}, {"bandwidth": 1.02 / (math.sqrt(2) * 0.1)}),
         ({"verdicts": {"x1, 1.5 breakaway": "hunting"}}, {"slip": 1.25}),
         # what hunts is first to stop hunting
         ({"verdicts": {"x1, 1 breakaway": "hunting"}, "overshoot": 2.0, "peak_current": 1e3}, {"slip": 1.25}),
@@ -294,6 +374,23 @@ def check(**changed):
 )
 def test_what_simulations_show_short_is_tightened_by_as_much(changed, asked):
     assert shortfalls([check(), check(**changed)], demand()) == pytest.approx(asked)
+
+
+def test_a_sine_that_failed_is_one_that_does_not_follow(one, monkeypatch):
+    bench = Bench(one)
+    failed = SimpleNamespace(harmonics=[[[0.0, 0.0], [math.nan, math.nan]]], settled=False)
+    monkeypatch.setattr(bench, "stream", SimpleNamespace(measure=lambda point: failed))
+    assert bench(Trial(SINE, {}, 0.05, 1.0)) == {"followed": 0.0, "settled": False}
+
+
+def test_steps_begin_at_rest():
+    # all is linear but for a trace of friction: a bias held from the beginning adds to the torque, not to the overshoot
+    plant = servo(gain=30.0, proportional=0.3, integral=2.0, coulomb=1e-4, breakaway=1e-4)
+    task = demand(amplitude=0.05)
+    plain, biased = check_corners(plant, [Corner("a", {}), Corner("b", {"load.bias": -0.5})], {}, task, workers=1)
+    assert plain.overshoot > 0.05
+    assert biased.overshoot == pytest.approx(plain.overshoot, rel=2e-3)
+    assert biased.peak_torque == pytest.approx(plain.peak_torque + 0.5, rel=2e-3)
 
 
 def test_tightened_demands_are_met_by_as_much_more(one):
@@ -321,16 +418,39 @@ class Pretender(Seeker):
         return self.low <= factor < self.high
 
 
-@pytest.mark.parametrize("begins", [0.7, 1.1, 1.29, 1.31, 1.7, 3.9])
-@pytest.mark.parametrize("width", [1.6, 100.0])
+@pytest.mark.parametrize("begins", [0.51, 0.7, 0.99, 1.1, 1.29, 1.31, 1.7, 3.9])
+@pytest.mark.parametrize("width", [1.26, 1.6, 100.0])
 def test_the_first_factor_of_hunting_is_found(begins, width):
-    # also where hunting ends again, because the motor is too weak to break away
+    # also where hunting ends again, because the motor is too weak to break away, and below what is demanded
     values = {"gear.bearings.a.breakaway": 2.0, "gear.bearings.a.coulomb": 1.0}
     seeker = Pretender(begins, begins * width, values)
     found = StictionMargin("", **seeker(Search(Corner("", {}), {}, demand(stiction_margin=1.3))))
-    if begins < 1.3 < begins * width or begins > 1.3:
-        assert found.rests < begins <= found.hunts <= ACCURACY * found.rests
+    assert found.rests < begins <= found.hunts <= ACCURACY * found.rests
     assert min(seeker.tried) >= 0.5
+
+
+def test_factors_that_are_tried_are_no_further_apart_than_a_step():
+    found = rungs(0.48, 1.3)
+    assert found[0] == 0.48 and found[-1] == MOST
+    assert {1.0, 1.3} <= set(found)
+    assert max(b / a for a, b in pairwise(found)) <= 1.25 + 1e-12
+    assert rungs(1.0, 5.0)[-1] == 5.0
+
+
+def test_a_margin_that_is_kept_is_that_of_the_demand_it_was_sought_for(one):
+    class Recorder(dict):
+        def __missing__(self, key):
+            raise LookupError(key)
+
+        def __contains__(self, key):
+            return True
+
+    asked = []
+    for margin in (1.2, 1.3):
+        with pytest.raises(LookupError) as missing:
+            stiction_margins(one, [Corner("", {})], {}, demand(stiction_margin=margin), done=Recorder(), workers=1)
+        asked.append(missing.value.args[0])
+    assert asked[0] != asked[1]
 
 
 def test_no_hunting_and_nothing_but_hunting():
@@ -340,6 +460,7 @@ def test_no_hunting_and_nothing_but_hunting():
     assert (never.rests, never.hunts) == (pytest.approx(MOST), None)
     assert (always.rests, always.hunts) == (None, pytest.approx(0.8))  # where breakaway is as large as sliding friction
     assert "none up to factor 4" in never.words
+    assert "at the lowest factor too" in always.words
     assert least_margin([never, always]) is always
 
 
@@ -385,6 +506,16 @@ def test_a_multiplier_is_what_the_demand_costs(one):
     assert found.standing_error == pytest.approx((1.5 * BREAKAWAY - COULOMB) / ((limit - COULOMB) / 0.05), rel=0.01)
     assert current.multiplier == pytest.approx(limit / (limit - COULOMB), rel=0.01)
     assert "1 % tighter costs 1.0" in current.cost
+
+
+def test_gains_stay_in_their_range_about_the_start_wherever_the_search_begins(one):
+    start = {POSITION: 20.0, SPEED: 0.6}
+    modes = corner_modes(for_linear_models(one), Corner("only", {INTEGRAL: 1e-12}), 1.5, start)
+    task = replace(specification(peak_current=1e4), tuning=Tuning(gains=(POSITION, SPEED), dead_band=True, range=1.2))
+    found = design([modes], start, task)
+    again = design([modes], start, task, first=found.gains)
+    assert max(again.gains[name] / value for name, value in start.items()) == pytest.approx(1.2)
+    assert again.gains == pytest.approx(found.gains, rel=1e-4)
 
 
 def test_demands_that_exclude_each_other(one):
@@ -463,8 +594,9 @@ def test_report(tuned, tmp_path):
     assert result["met"]
     assert result["gains"]["tuned"][DEAD_BAND] > 0
     html = (tmp_path / "report.html").read_text()
-    assert "All demands met" in html
-    assert "begin to hunt" in html
+    assert "All demands met: margins and stiffness on the linear models" in html
+    assert "begin to hunt or not to decide" in html
+    assert "have failed or not settled: before at as it is</li>" in html  # and none after
     assert [row["corner"] for row in result["stiction_margins"]["tuned"]] == ["as it is", "less"]
     assert html.count("data:image/png;base64") == 4
 

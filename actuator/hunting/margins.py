@@ -25,7 +25,7 @@ ENDINGS = {
     BACKLASH: (".gap",),
     INTEGRAL: ("controller.integral", "controller.speed.integral"),
 }
-FLOORS = {".breakaway": ".coulomb", ".static": ".sliding"}  # breakaway friction is never below sliding friction
+SLIDING = {".breakaway": (".coulomb",), ".static": (".sliding", ".coulomb")}  # what breakaway becomes once it slides
 LEAST, MOST = 1 / 16, 16.0  # factors that are tried: 24 dB
 RESOLVED = 0.02  # of the factor
 POINTS = 5000
@@ -105,7 +105,7 @@ def hunting_margin(  # noqa: PLR0913 - what is simulated
         plant,
         kind,
         {name: defaults[name] for name in names},
-        {name: _floor(name, defaults) for name in names},
+        defaults,
         dict(parameters or {}),
         start,
         duration,
@@ -146,13 +146,13 @@ class _Trials:
         plant: Actuator,
         kind: str,
         values: Mapping[str, float],
-        floors: Mapping[str, float],
+        defaults: Mapping[str, float],
         others: Mapping[str, float],
         start: Mapping[str, float] | None,
         duration: float,
         common: Mapping[str, Any],
     ) -> None:
-        self.plant, self.kind, self.values, self.floors, self.others = plant, kind, values, floors, others
+        self.plant, self.kind, self.values, self.defaults, self.others = plant, kind, values, defaults, others
         self.start, self.duration, self.common = start, duration, common
         self.length, self.coarse = duration, True
         self.runs: list[tuple[float, str]] = []
@@ -169,7 +169,7 @@ class _Trials:
 
     def _decided(self, factor: float, begin: Mapping[str, float] | None) -> tuple[Run, Hunting]:
         """A run, gone on with where its verdict waits for a slow controller; what moves irregularly, moves."""
-        changed = {name: max(factor * value, self.floors[name]) for name, value in self.values.items()}
+        changed = {name: at_least_sliding(name, factor * value, self.defaults) for name, value in self.values.items()}
         options = {**self.common, "parameters": {**self.others, **changed}}
         step = self.duration / POINTS
         run, verdict = decide(self.plant, self.length, longest=1.0, start=begin, resolution=step, **options)
@@ -199,9 +199,15 @@ def _has(names: Sequence[str], kind: str) -> bool:
     return any(name.endswith(ENDINGS[kind]) for name in names)
 
 
-def _floor(name: str, values: Mapping[str, float]) -> float:
-    """The least value of a parameter."""
-    for ending, other in FLOORS.items():
+def sliding_of(name: str, values: Mapping[str, float]) -> str | None:
+    """Name of the sliding friction that belongs to a breakaway friction; None for what is none, or has none."""
+    for ending, others in SLIDING.items():
         if name.endswith(ending):
-            return values.get(name.removesuffix(ending) + other, 0.0)
-    return 0.0
+            return next((other for part in others if (other := name.removesuffix(ending) + part) in values), None)
+    return None
+
+
+def at_least_sliding(name: str, value: float, values: Mapping[str, float]) -> float:
+    """A value for a parameter; for breakaway friction no less than its sliding friction among the values."""
+    other = sliding_of(name, values)
+    return value if other is None else max(value, values[other])

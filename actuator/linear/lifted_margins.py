@@ -8,7 +8,7 @@ import control
 import numpy as np
 from scipy.optimize import brentq
 
-from actuator.linear.loop_response import UNSTABLE
+from actuator.linear.stability import room
 
 GAINS = np.logspace(-4, 4, 1601)  # factors on the loop gain that are tried
 PHASES = np.linspace(0, math.pi, 721)  # rad
@@ -55,30 +55,29 @@ def lifted_margins(loop: control.StateSpace) -> LiftedMargins:
         )
     one = np.eye(len(d))
 
-    def room(factor: complex) -> float:
+    def spare(factor: complex) -> float:
         """How far inside the unit circle the slowest closed pole is."""
-        closed = a - factor * b @ np.linalg.solve(one + factor * d, c)
-        return 1 + UNSTABLE - float(abs(np.linalg.eigvals(closed)).max(initial=0.0))
+        return room(a - factor * b @ np.linalg.solve(one + factor * d, c), discrete=True)
 
     step = np.exp(1j * np.linspace(0, math.pi, FREQUENCIES + 1)[1:])
     loops = np.asarray(loop(step)).reshape(*d.shape, -1)
     peak = max(float(np.linalg.norm(np.linalg.inv(one + value), 2)) for value in np.moveaxis(loops, -1, 0))
-    if room(1.0) < 0:
+    if spare(1.0) < 0:
         return LiftedMargins(stable=False, lower_gain=1.0, upper_gain=1.0, phase_rad=0.0, peak_sensitivity=peak)
     return LiftedMargins(
         stable=True,
-        lower_gain=_edge(room, GAINS[GAINS < 1][::-1], 0.0),
-        upper_gain=_edge(room, GAINS[GAINS > 1], math.inf),
-        phase_rad=_edge(lambda phase: room(np.exp(-1j * phase)), PHASES[1:], math.inf),
+        lower_gain=_edge(spare, GAINS[GAINS < 1][::-1], 0.0),
+        upper_gain=_edge(spare, GAINS[GAINS > 1], math.inf),
+        phase_rad=_edge(lambda phase: spare(np.exp(-1j * phase)), PHASES[1:], math.inf),
         peak_sensitivity=peak,
     )
 
 
-def _edge(room: Callable[[float], float], grid: np.ndarray, nothing: float) -> float:
+def _edge(spare: Callable[[float], float], grid: np.ndarray, nothing: float) -> float:
     """Where the room is used up, on the way along the grid; `nothing` where it never is."""
     before = None
     for value in grid:
-        if room(value) < 0:
-            return float(value) if before is None else float(brentq(room, before, value, full_output=True)[1].root)
+        if spare(value) < 0:
+            return float(value) if before is None else float(brentq(spare, before, value, full_output=True)[1].root)
         before = value
     return nothing

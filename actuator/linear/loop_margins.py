@@ -7,17 +7,16 @@ import control
 import numpy as np
 
 from actuator.linear.disk_margin import DiskMargin, disk_margin, disk_of, peak_of
-from actuator.linear.loop_response import GRID, LoopResponse
+from actuator.linear.loop_response import GRID, NOTHING, LoopResponse
 
 CUT, SLOW = 1e-6, 1e-2  # a loop whose gain is below CUT above SLOW rad/s is cut
-NOTHING = 1e-9  # loop gain of a loop that is not there: a stuck gear passes nothing on, but for rounding
 
 
 @dataclass(frozen=True)
 class PhaseCrossing:
     """Where the loop is real and negative."""
 
-    frequency: float  # rad/s
+    frequency: float  # rad/s; infinite for what passes at once
     gain: float  # factor on the loop gain that brings it to -1
 
 
@@ -157,7 +156,8 @@ def _phase_crossings(
 ) -> list[PhaseCrossing]:
     # on the negative real axis the imaginary part changes sign, away from it the branch at 0 deg does too
     real = [(w, response(w).real) for w in response.roots(np.imag, frequencies, values, doubts)]
-    return [PhaseCrossing(w, -1 / value) for w, value in sorted(real + response.at_ends()) if value < -NOTHING]
+    found = sorted(real + response.at_ends())
+    return [PhaseCrossing(w, -1 / value) for w, value in found if -1 / NOTHING < value < -NOTHING]
 
 
 def _gain_crossings(

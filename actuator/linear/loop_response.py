@@ -7,10 +7,15 @@ import control
 import numpy as np
 from scipy.optimize import brentq
 
-UNSTABLE = 1e-9  # part of the fastest pole that a pole may lie beyond the boundary by rounding
+from actuator.linear.stability import room
+
+NOTHING = 1e-9  # loop gain of a loop that is not there: a stuck gear passes nothing on; of an integrator, its inverse
 GRID = np.logspace(-6, 6, 6001)  # rad/s, on which crossings are bracketed
 NYQUIST = 1 - 1e-9  # part of half the sampling rate up to which a loop in discrete time is looked at
 AT_ONCE = 500  # frequencies
+LIGHT = 1e-2  # damping ratio of a resonance that would pass between points of the grid
+LEAST = 1e-9  # damping ratio, of an undamped one
+BESIDE = np.array([0, 1, 3, 10, 30, 100])  # half widths of a resonance from its middle
 
 
 class LoopResponse:
@@ -73,34 +78,41 @@ class LoopResponse:
         return (self.c @ x + self.d)[:, 0, 0], doubt[:, 0, 0]
 
     def at_ends(self) -> list[tuple[float, float]]:
-        """Frequency and L at standstill, and at half the sampling rate, where L is real; not where it has a pole.
+        """Frequency and L at standstill, and at infinity or half the sampling rate, where L is real; not at a pole.
 
         A pole is there where coefficients that differ by n eps have one: n eps rho(|1/(s - A)| |s - A|) >= 1, rho being
         the spectral radius (Bauer's condition number, which no units change).
         """
-        found = []
+        found = [] if self.step else [(math.inf, self.d.item())]
         for frequency in (0.0, math.pi / self.step) if self.step else (0.0,):
             matrix = np.real(self.point(frequency)) * np.eye(len(self.a)) - self.a
             value, doubt = (float(np.real(part[0])) for part in self.values(np.array([frequency])))
-            if math.isfinite(doubt) and doubt < abs(value):
+            if doubt < abs(value) < math.inf:
                 condition = abs(np.linalg.eigvals(abs(np.linalg.inv(matrix)) @ abs(matrix))).max(initial=0.0)
                 if condition * len(matrix) * np.finfo(float).eps < 1:
                     found.append((frequency, value))
         return found
 
     def grid(self, frequencies: np.ndarray) -> np.ndarray:
-        """The frequencies at which the loop has a response of its own."""
-        if not self.step:
-            return frequencies
-        end = NYQUIST * math.pi / self.step
-        return np.append(frequencies[frequencies < end], end)
+        """The frequencies at which the loop has a response of its own, and those of resonances between them."""
+        if self.step:
+            end = NYQUIST * math.pi / self.step
+            frequencies = np.append(frequencies[frequencies < end], end)
+        near = self._resonances()
+        return np.union1d(frequencies, near[(near > frequencies[0]) & (near < frequencies[-1])])
+
+    def _resonances(self) -> np.ndarray:
+        """Frequencies in and beside the lightly damped poles."""
+        poles = np.linalg.eigvals(self.a).astype(complex)
+        poles = np.log(poles[poles != 0]) / self.step if self.step else poles
+        poles = poles[np.imag(poles) > 0]
+        damping = abs(np.real(poles)) / abs(poles)
+        widths = np.maximum(damping, LEAST)[damping < LIGHT, None] * np.append(-BESIDE, BESIDE)
+        return (abs(poles)[damping < LIGHT, None] * (1 + widths)).ravel()
 
     def stable(self) -> bool:
         """Whether the closed loop, 1/(1 + L), is."""
-        poles = np.linalg.eigvals(self.a - self.b @ self.c / (1 + self.d.item()))
-        if self.step:
-            return bool((abs(poles) <= 1 + UNSTABLE).all())
-        return bool((np.real(poles) <= UNSTABLE * np.abs(poles).max(initial=1.0)).all())
+        return room(self.a - self.b @ self.c / (1 + self.d.item()), discrete=self.step > 0) >= 0
 
     def roots(
         self, of: Callable[[np.ndarray], np.ndarray], frequencies: np.ndarray, values: np.ndarray, doubts: np.ndarray

@@ -8,11 +8,11 @@ import numpy as np
 
 from actuator.hybrid import HybridSystem
 from actuator.ledger import PREFIX
+from actuator.linear.balance import rounding
 from actuator.linear.jacobians import jacobians, require_smooth
 from actuator.linear.locked import unlocked
 from actuator.linear.operating_point import NoEquilibrium, OperatingPoint
 from actuator.linear.sampled import lifted
-from actuator.linear.trim import rounding
 from actuator.parameters import require_known
 
 CANCELED = 8 * np.finfo(float).eps  # part that is left by rounding of what the opened loop had fed back
@@ -67,18 +67,31 @@ def linearize(
     ValueError
         For sensors that count or are noisy: their steps have no derivative.
     """
-    system = point.system
     _require_still(point, drifting)
-    selected = _select(system, inputs, outputs)
+    selected = _select(point.system, inputs, outputs)
+    matrices, step = _matrices(point, selected)
+    return _model(point, matrices, selected.inputs, selected.outputs, step, minimal=minimal)
+
+
+def least_dynamics(point: OperatingPoint, *, drifting: Sequence[str] = ()) -> tuple[np.ndarray, list[str], float]:
+    """A of `linearize` without what stuck contacts lock, the names of its states, and its period (0: continuous).
+
+    python-control has no model with one state and no input.
+    """
+    _require_still(point, drifting)
+    matrices, step = _matrices(point, _select(point.system, [], []))
+    (a, *_), kept = unlocked(point, matrices)
+    return a, [point.system.states[k].name for k in kept], step
+
+
+def _matrices(point: OperatingPoint, selected: _Selected) -> tuple[tuple[np.ndarray, ...], float]:
+    """A, B, C, D, and their period (0: continuous)."""
+    system = point.system
     if system.clocks:
         every = system.hyperperiod
-        a, b, c, d = lifted(point, selected.columns, selected.rows, every)
-        step = every * system.tick_period(point.p)
-    else:
-        a, b, c, d = jacobians(point)
-        b, c, d = b[:, selected.columns], c[selected.rows], d[np.ix_(selected.rows, selected.columns)]
-        step = 0.0
-    return _model(point, (a, b, c, d), selected.inputs, selected.outputs, step, minimal=minimal)
+        return lifted(point, selected.columns, selected.rows, every), every * system.tick_period(point.p)
+    a, b, c, d = jacobians(point)
+    return (a, b[:, selected.columns], c[selected.rows], d[np.ix_(selected.rows, selected.columns)]), 0.0
 
 
 def _require_still(point: OperatingPoint, drifting: Sequence[str]) -> None:

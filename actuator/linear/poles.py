@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import eig
 
-from actuator.linear.model import linearize
+from actuator.linear.model import least_dynamics
 from actuator.linear.operating_point import OperatingPoint
 
 if TYPE_CHECKING:
@@ -117,21 +117,19 @@ def poles(point: OperatingPoint, *, drifting: Sequence[str] = ()) -> Poles:
     -------
     Poles
     """
-    model = linearize(point, [], [], drifting=drifting, minimal=True)
-    names = {quantity.name.replace(".", "_"): quantity.name for quantity in point.system.states}
-    states = tuple(names[label] for label in model.state_labels)
-    a = np.asarray(model.A)
-    scale = np.array([next(q.nominal for q in point.system.states if q.name == name) for name in states])
+    a, states, step = least_dynamics(point, drifting=drifting)
+    nominal = {quantity.name: quantity.nominal for quantity in point.system.states}
+    scale = np.array([nominal[name] for name in states])
     values, left, right = eig(a / scale[:, None] * scale, left=True, right=True)  # pyright: ignore[reportAssignmentType] - stubs of three answers
     shares = abs(left.conj() * right)
     shares = shares / shares.sum(axis=0)
-    if model.dt:
+    if step:
         # a delay has its pole at z = 0, infinitely fast
-        values = np.array([np.log(complex(z)) / model.dt if abs(z) > AT_ONCE else -np.inf for z in values])
+        values = np.array([np.log(complex(z)) / step if abs(z) > AT_ONCE else -np.inf for z in values])
     values = np.where(abs(values) > RIGID * abs(values[np.isfinite(values)]).max(initial=0.0), values, 0)
     found = [
         Pole(value=complex(value), participation=dict(zip(states, share.tolist(), strict=True)))
         for value, share in zip(values, shares.T, strict=True)
-        if value.imag >= 0 or model.dt and value.imag <= -math.pi / model.dt * (1 - RIGID)
+        if value.imag >= 0 or step and value.imag <= -math.pi / step * (1 - RIGID)
     ]
-    return Poles(poles=tuple(sorted(found, key=lambda pole: pole.frequency)), states=states)
+    return Poles(poles=tuple(sorted(found, key=lambda pole: pole.frequency)), states=tuple(states))

@@ -1,20 +1,25 @@
 """Loops for tools that work with polynomials: without poles that do not show and poles that are too fast to matter."""
 
+import math
+
 import control
 import numpy as np
 from scipy.linalg import hessenberg, matrix_balance, schur, solve_sylvester
 
-from actuator.linear.loop_response import GRID, LoopResponse
+from actuator.linear.loop_response import GRID, NOTHING, LoopResponse
 
-HIDDEN = 1e-10  # part of the model by which a state is moved, or seen, by rounding
+HIDDEN = 1e-10 * 0.1 ** np.arange(7)  # parts of the model by which a state may be moved, or seen, by rounding
+SAME, SLOW = 1e-2, 1e-2  # part of the response that may change above SLOW [rad/s] by what is left out
 PASSED = 0.5  # largest loop gain at which fast poles may be taken together
+COARSE = 20  # of the points of the grid, every so many are compared
 FAINT = 1e-3  # part of the loop at `fastest` of which the fast poles are left out
 
 
 def reduced(loop: control.StateSpace, fastest: float | None = None) -> control.StateSpace:
     """A loop with the same response up to a frequency and fewer states, for root loci.
 
-    States that the input does not move or the output does not see are left out, which is exact. Poles faster than
+    States that the input does not move or the output does not see, but for rounding, are left out as long as the
+    response above 0.01 rad/s stays that of the loop to 1 %: integrators below that may not be kept. Poles faster than
     `fastest` become one lag at that frequency with their gain at standstill, or nothing where that is nothing.
 
     Tools that turn a model into polynomials (`control.root_locus_map`, `control.sisotool`, `control.tf`) need both: the
@@ -46,11 +51,31 @@ def reduced(loop: control.StateSpace, fastest: float | None = None) -> control.S
     if fastest is not None:
         _require_slow_crossover(response, fastest)
         a, b, c = _slow(a, b, c, fastest, FAINT * abs(response(fastest)))
-    a, c, b = (part.T for part in _moved(a.T, c.T, b.T))
-    a, b, c = _moved(a, b, c)
-    return control.StateSpace(
+    whole = control.StateSpace(
         a, b, c, response.d, loop.dt, inputs=loop.input_labels, outputs=loop.output_labels, remove_useless_states=False
     )
+    return next((shown for shown in (_shown(whole, hidden) for hidden in HIDDEN) if _same(shown, whole)), whole)
+
+
+def _shown(loop: control.StateSpace, hidden: float) -> control.StateSpace:
+    """The part of a loop that the input moves and the output sees."""
+    a, b, c = (np.asarray(part) for part in (loop.A, loop.B, loop.C))
+    a, c, b = (part.T for part in _moved(a.T, c.T, b.T, hidden))
+    a, b, c = _moved(a, b, c, hidden)
+    return control.StateSpace(
+        a, b, c, loop.D, loop.dt, inputs=loop.input_labels, outputs=loop.output_labels, remove_useless_states=False
+    )
+
+
+def _same(shown: control.StateSpace, whole: control.StateSpace) -> bool:
+    """Whether two loops have the same response, where there is one beyond doubt."""
+    response = LoopResponse(whole)
+    frequencies = GRID[::COARSE][GRID[::COARSE] > SLOW]
+    if response.step:
+        frequencies = frequencies[frequencies < math.pi / response.step]
+    values, doubts = response.values(frequencies)
+    found, _ = LoopResponse(shown).values(frequencies)
+    return bool((abs(found - values) <= SAME * abs(values) + doubts + NOTHING).all())
 
 
 def _require_slow_crossover(response: LoopResponse, fastest: float) -> None:
@@ -87,7 +112,7 @@ def _slow(a: np.ndarray, b: np.ndarray, c: np.ndarray, fastest: float, faint: fl
     return lagged, np.vstack([b_slow, [[fastest]]]), np.hstack([c_slow, gain])
 
 
-def _moved(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, ...]:
+def _moved(a: np.ndarray, b: np.ndarray, c: np.ndarray, hidden: float) -> tuple[np.ndarray, ...]:
     """The part that the input moves: a staircase from the input on, up to the first step that is rounding."""
     n = len(a)
     if not b.any() or not c.any():
@@ -96,11 +121,11 @@ def _moved(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, ...
     bordered[1:, :1], bordered[1:, 1:] = b / np.linalg.norm(b), a
     stairs, base = hessenberg(bordered, calc_q=True)
     steps = abs(np.diag(stairs, -1))[1:]
-    small = np.flatnonzero(steps <= HIDDEN * np.linalg.norm(a, 2))
+    small = np.flatnonzero(steps <= hidden * np.linalg.norm(a, 2))
     kept = int(small[0]) + 1 if len(small) else n
     driven = np.zeros((kept, 1))
     driven[0] = stairs[1, 0] * np.linalg.norm(b)
     seen = c @ base[1:, 1 : kept + 1]
     # exactly zero where it is rounding: a response that falls faster than 1/s has no zero at 1e12 rad/s
-    seen[0, : int((abs(seen[0]) > HIDDEN * abs(seen).max()).argmax())] = 0
+    seen[0, : int((abs(seen[0]) > hidden * abs(seen).max()).argmax())] = 0
     return np.triu(stairs[1 : kept + 1, 1 : kept + 1], -1), driven, seen

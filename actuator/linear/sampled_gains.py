@@ -13,11 +13,11 @@ from scipy.linalg import expm, expm_frechet
 
 from actuator.hybrid import HybridSystem
 from actuator.ledger import PREFIX
+from actuator.linear.balance import rates_function
 from actuator.linear.jacobians import require_smooth
 from actuator.linear.model import ticks_between
 from actuator.linear.operating_point import OperatingPoint
 from actuator.linear.sampled_gain_model import SampledGainModel
-from actuator.linear.trim import rates_function
 from actuator.parameters import require_known
 
 SAME = 1e-13  # relative change of what flows between ticks that is none

@@ -2,14 +2,12 @@
 
 import contextlib
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
 
-import casadi as ca
 import numpy as np
 
 from actuator.actuator import Actuator
 from actuator.hybrid import HybridSystem
-from actuator.linear.locked import eliminated, slips
+from actuator.linear.balance import Balance
 from actuator.linear.operating_point import STOPS, NoEquilibrium, OperatingPoint, modes_of, usual_flank
 from actuator.parameters import require_known
 from actuator.simulation.run import contact_labels
@@ -17,8 +15,6 @@ from actuator.simulation.run import contact_labels
 STEPS = 60  # Newton steps; the equations of a mode are nearly linear
 POLISH = 3  # more of them once the residual is small, as long as it falls
 SETTLING = 1e-5 * 2.0 ** np.arange(34)  # s, up to a day
-STILL = 1e-9  # rate of a state over its nominal size [1/s] that counts as zero
-ROUNDING, MOST_ROUNDING = 100 * np.finfo(float).eps, 1e-2
 SLOWEST = 1e-6  # rate [1/s] of a row that still counts in full: of what no state moves, rounding would count for all
 HOLDS = -1e-6  # a margin below this does not hold
 
@@ -91,7 +87,6 @@ def trim(  # noqa: PLR0913 - what may be held and where to start are all choices
             guess, flanks = before.states, before.flanks
     u, p = system.input_vector(inputs), system.parameter_values(parameters)
     x = system.state_vector(guess, p)
-    scale = np.array([quantity.nominal for quantity in system.states])
     free = np.array([name not in drifting for name in names])
     flank_names = [name.removesuffix(".flank") for name in system.modes if name.endswith(".flank")]
     usual = {name: usual_flank(name) for name in flank_names}
@@ -101,7 +96,7 @@ def trim(  # noqa: PLR0913 - what may be held and where to start are all choices
     tried = []
     for _ in range(2 + 2 * len(flanks)):
         m = modes_of(system, contacts, flanks)
-        x, rates = _newton(system, x, m, u, p, scale, free)
+        x, rates = _newton(Balance(system, x, m, u, p, free), x)
         margins = system.margins(x, m, u, p).full().ravel()
         named = dict(zip(system.margin_names, margins, strict=True))
         found = _turned(named, flanks)
@@ -110,7 +105,7 @@ def trim(  # noqa: PLR0913 - what may be held and where to start are all choices
         tried.append(flanks)
         flanks = _freed(named, flanks, found) if found in tried else found
     if margins.size and margins.min() < HOLDS:
-        m, held = _held_by_others(system, x, m, u, p)
+        m, rates, held = _held_by_others(Balance(system, x, m, u, p, free), x, rates)
         margins = np.zeros(1) if held else margins
     if margins.size and margins.min() < HOLDS:
         raise NoEquilibrium(
@@ -121,81 +116,34 @@ def trim(  # noqa: PLR0913 - what may be held and where to start are all choices
     return OperatingPoint(system=system, x=x, m=m, u=u, p=p, rates=rates)
 
 
-def _held_by_others(
-    system: HybridSystem, x: np.ndarray, m: np.ndarray, u: np.ndarray, p: np.ndarray
-) -> tuple[np.ndarray, bool]:
-    """Modes with contacts at their limit, where others that lock the same shaft take over, and whether all hold."""
+def _held_by_others(balance: Balance, x: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Modes and rates with contacts at their limit, where others that lock the same shaft take over, and whether so."""
+    system, m, u, p = balance.system, balance.m, balance.u, balance.p
     _, modes, fault = system.reset(np.zeros(len(system.margin_names)), x, m, u, p)
     after = np.round(modes.full().ravel())
-    same = contact_labels(system.modes, m) == contact_labels(system.modes, after)
-    return (after, True) if same and not float(fault) else (m, False)
+    same = contact_labels(system.modes, m) == contact_labels(system.modes, after) and all(
+        before == now for name, before, now in zip(system.modes, m, after, strict=True) if name.endswith(".flank")
+    )
+    taken = Balance(system, x, after, u, p, balance.free)
+    if float(fault) or not same or not taken.holds(x):
+        return m, rates, False
+    return after, taken.unlocked(taken.flow(x)), True
 
 
-def _newton(
-    system: HybridSystem,
-    x: np.ndarray,
-    m: np.ndarray,
-    u: np.ndarray,
-    p: np.ndarray,
-    scale: np.ndarray,
-    free: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Least-norm Newton steps, in states over their nominal sizes, damped until the residual falls.
+def _newton(balance: Balance, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """State and rates after least-norm Newton steps, damped until the residual falls.
 
     Where they do not arrive, as a limit has no slope that leads back, they go on from where time would lead.
     """
-    flow, jacobian = rates_function(system), _jacobian(system)
-    # what stuck contacts lock is no unknown: the balance of its torques holds whatever they are, but for rounding
-    start = OperatingPoint(system=system, x=x, m=m, u=u, p=p, rates=np.zeros_like(x))
-    expressed, kept = eliminated([row * scale for row in slips(start)], len(x))
-    x = scale * (expressed @ (x / scale)[kept])
-    unknown = np.flatnonzero(free[kept])  # a drifting state may have any constant rate
-    equations, moves = np.array(kept)[unknown], expressed[:, unknown]
-
-    def residual(state: np.ndarray) -> np.ndarray:
-        return (flow(state, m, u, p).full().ravel() / scale)[equations]
-
-    def slopes(state: np.ndarray) -> np.ndarray:
-        return (jacobian(state, m, u, p).full() / scale[:, None] * scale[None, :])[equations] @ moves
-
-    def found(state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        rates = scale * (expressed @ (flow(state, m, u, p).full().ravel() / scale)[kept])
-        return rates, abs(np.where(free, rates / scale, 0.0))
-
-    def steps(state: np.ndarray) -> np.ndarray:
-        rate, polished = residual(state), 0
-        for _ in range(STEPS):
-            polished += bool((abs(rate) <= rounding(system, state, m, u, p)[equations]).all())
-            if polished > POLISH:
-                break
-            matrix = slopes(state)
-            rows = 1 / np.maximum(np.linalg.norm(matrix, axis=1), SLOWEST)  # stiff rows would drown the others
-            step = scale * (moves @ np.linalg.lstsq(rows[:, None] * matrix, -rows * rate, rcond=1e-13)[0])
-            for damping in (1.0, 0.5, 0.1, 0.01):
-                trial = residual(state + damping * step)
-                if np.linalg.norm(rows * trial) < np.linalg.norm(rows * rate):
-                    break
-            else:
-                if polished:
-                    break
-            state, rate = state + damping * step, trial
-        return state
-
-    def settled(state: np.ndarray) -> np.ndarray:
-        """After steps of implicit Euler, each twice as long as the one before."""
-        for duration in SETTLING:
-            change = np.linalg.solve(np.eye(len(equations)) / duration - slopes(state), residual(state))
-            state = state + scale * (moves @ change)
-        return state
-
-    arrived = steps(x)
-    rates, left = found(arrived)
-    if (left > rounding(system, arrived, m, u, p)).any():
+    x = balance.unlocked(x)
+    arrived = _steps(balance, x)
+    if not balance.holds(arrived):
         with contextlib.suppress(np.linalg.LinAlgError):  # nowhere, where time leads to infinity
-            later = steps(settled(x))
-            if (found(later)[1] <= rounding(system, later, m, u, p)).all():
-                return later, found(later)[0]
-        worst = np.argsort(-left)[:3]
+            later = _steps(balance, _settled(balance, x))
+            if balance.holds(later):
+                return later, balance.unlocked(balance.flow(later))
+        system, rates = balance.system, balance.unlocked(balance.flow(arrived))
+        worst = np.argsort(-balance.left(arrived))[:3]
         named = dict(zip([quantity.name for quantity in system.states], rates, strict=True))
         text = ", ".join(f"d({system.states[i].name})/dt = {rates[i]:.4g} {system.states[i].unit}/s" for i in worst)
         raise NoEquilibrium(
@@ -203,27 +151,34 @@ def _newton(
             "Check the load against the torque and voltage limits, or let states that move steadily drift",
             named,
         )
-    return arrived, rates
+    return arrived, balance.unlocked(balance.flow(arrived))
 
 
-def rounding(system: HybridSystem, x: np.ndarray, m: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """Rates of the states over their nominal sizes [1/s] that are rounding: stiff teeth make much of little."""
-    scale = np.array([quantity.nominal for quantity in system.states])
-    matrix = np.abs(_jacobian(system)(x, m, u, p).full())
-    return STILL + np.minimum(ROUNDING * (matrix @ np.abs(x)) / scale, MOST_ROUNDING)
+def _steps(balance: Balance, state: np.ndarray) -> np.ndarray:
+    """The state after Newton steps, and some more once the residual is small."""
+    rate, polished = balance.residual(state), 0
+    for _ in range(STEPS):
+        polished += bool((abs(rate) <= balance.rounding(state)[balance.equations]).all())
+        if polished > POLISH:
+            break
+        matrix = balance.slopes(state)
+        rows = 1 / np.maximum(np.linalg.norm(matrix, axis=1), SLOWEST)  # stiff rows would drown the others
+        change = np.linalg.lstsq(rows[:, None] * matrix, -rows * rate, rcond=1e-13)[0]
+        step = balance.scale * (balance.moves @ change)
+        for damping in (1.0, 0.5, 0.1, 0.01):
+            trial = balance.residual(state + damping * step)
+            if np.linalg.norm(rows * trial) < np.linalg.norm(rows * rate):
+                break
+        else:
+            if polished:
+                break
+        state, rate = state + damping * step, trial
+    return state
 
 
-@lru_cache(maxsize=32)
-def _jacobian(system: HybridSystem) -> ca.Function:
-    x, m, u, p = (ca.SX.sym(name, system.flow.size1_in(i)) for i, name in enumerate(("x", "m", "u", "p")))
-    return ca.Function("jacobian", [x, m, u, p], [ca.jacobian(rates_function(system)(x, m, u, p), x)])
-
-
-@lru_cache(maxsize=32)
-def rates_function(system: HybridSystem) -> ca.Function:
-    """(x, m, u, p) -> dx/dt; of what a clock holds, the change at a tick at which all are due, over the period."""
-    if system.tick is None or system.period is None:
-        return system.flow
-    x, m, u, p = (ca.SX.sym(name, system.flow.size1_in(i)) for i, name in enumerate(("x", "m", "u", "p")))
-    changes = (system.tick(ca.SX.ones(len(system.clocks)), x, m, u, p) - x) / system.period(p)
-    return ca.Function("rates", [x, m, u, p], [system.flow(x, m, u, p) + changes])
+def _settled(balance: Balance, state: np.ndarray) -> np.ndarray:
+    """After steps of implicit Euler, each twice as long as the one before."""
+    for duration in SETTLING:
+        matrix = np.eye(len(balance.equations)) / duration - balance.slopes(state)
+        state = state + balance.scale * (balance.moves @ np.linalg.solve(matrix, balance.residual(state)))
+    return state

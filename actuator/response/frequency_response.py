@@ -2,6 +2,7 @@
 
 import hashlib
 import itertools
+import math
 from collections.abc import Callable, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from actuator.response.record import Spectrum
 
 DIMENSIONS = ("set", "load", "amplitude", "frequency")
+SAME = 1e-6  # relative difference of two numbers on an axis that are one
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,8 +34,9 @@ class FrequencyResponse:
     ----------
     data : xarray.Dataset
         Over set, load [N m], amplitude, frequency [Hz] and output: `response` (complex, the fundamental of the output
-        over the sine), `harmonics` (complex, of the output), `distortion` (all harmonics over the fundamental, of what
-        moves), `mean`, `peak_to_peak`; without output: `settled`, `moves`, `slides`, `stuck`, `periods`, `note`.
+        over the sine), `harmonics` (complex, of the output), `distortion` (the harmonics that are kept over the
+        fundamental, of what moves; nan where only that is kept), `mean`, `peak_to_peak`; without output: `settled`,
+        `moves`, `slides`, `stuck`, `periods`, `note`.
     given : str
         The input of the sine.
     """
@@ -42,10 +45,16 @@ class FrequencyResponse:
     given: str
 
     def select(self, variable: str = "response", **where: Any) -> xarray.DataArray:
-        """A variable at one place of the dimensions that are named; of the others the first."""
+        """A variable at one place of the dimensions that are named; of sets, loads and outputs else the first.
+
+        Raises
+        ------
+        KeyError
+            For a place that there is not.
+        """
         array = self.data[variable]
         for name, value in where.items():
-            array = array.sel({name: value}, method=None if isinstance(value, str) else "nearest")
+            array = array.isel({name: _place(array[name], value)})
         rest = [name for name in array.dims if name in ("set", "load", "output") and name not in where]
         return array.isel(dict.fromkeys(rest, 0))
 
@@ -193,6 +202,15 @@ def frequency_response(  # noqa: PLR0913 - an experiment has this many choices, 
     return FrequencyResponse(data=_dataset(stream, found, coordinates), given=given)
 
 
+def _place(axis: xarray.DataArray, value: Any) -> int:
+    """Where a value stands on an axis."""
+    known = axis.values.tolist()
+    for k, one in enumerate(known):
+        if one == value or (not isinstance(value, str) and math.isclose(one, value, rel_tol=SAME)):
+            return k
+    raise KeyError(f"no {axis.name} {value!r}; there are {', '.join(map(repr, known))}")
+
+
 class _Measurement:
     """The work of a sweep."""
 
@@ -210,9 +228,7 @@ def point_key(stream: SineStream, point: SinePoint) -> str:
     names = [quantity.name for quantity in (*system.states, *system.inputs, *system.outputs)]
     settings = (stream.given, tuple(stream.seen), stream.harmonics, stream.agreement, stream.tolerance)
     parts = (names, [parameter.name for parameter in system.parameters], p.tolist(), u.tolist(), settings)
-    # the graph of the flow says which laws there are
-    model = f"{system.flow.n_nodes()} {system.margins.n_nodes()} {system.outputs_function.n_nodes()}"
-    digest = hashlib.sha256(repr((parts, model)).encode()).hexdigest()[:16]
+    digest = hashlib.sha256(repr((parts, stream.model)).encode()).hexdigest()[:16]
     return f"{point.amplitude:.12g} at {point.frequency:.12g} Hz, {digest}"
 
 
@@ -233,6 +249,7 @@ def _dataset(
         return np.array([getattr(place, name) for place in places]).reshape(shape)
 
     heights = abs(amplitudes[..., 1:])
+    told = table("moves") & (harmonics > 1)
     with np.errstate(divide="ignore", invalid="ignore"):
         distortion = np.linalg.norm(heights[..., 1:], axis=-1) / heights[..., 0]
     return xarray.Dataset(
@@ -240,7 +257,7 @@ def _dataset(
             "response": (full, amplitudes[..., 1] / sizes, {"units": f"({seen_unit})/({units[stream.given]})"}),
             "mean": (full, np.real(amplitudes[..., 0]), {"units": seen_unit}),
             "harmonics": ((*full, "harmonic"), amplitudes[..., 1:], {"units": seen_unit}),
-            "distortion": (full, np.where(table("moves")[..., None], distortion, np.nan), {"units": "-"}),
+            "distortion": (full, np.where(told[..., None], distortion, np.nan), {"units": "-"}),
             "peak_to_peak": (
                 full,
                 np.array([place.peak_to_peak for place in places]).reshape(*shape, outputs),

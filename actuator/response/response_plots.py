@@ -22,7 +22,8 @@ CLEAR = 0.9  # coherence from which a spectrum is shown over others
 MOST_BELOW = 80.0  # dB below the largest that is shown
 HARMONICS = (2, 3, 5)  # that get a panel of their own
 STILL = ": no motion"
-READING = "open points have not settled, a line ends where nothing moves"
+FAILED = ": failed"
+READING = "open points have not settled, a line ends where nothing moves or a simulation failed"
 LEAST_PERCENT = 0.01  # of the fundamental that is shown
 
 
@@ -72,9 +73,10 @@ def draw_responses(
     for amplitude, label, color in _amplitudes(data):
         response = measured.select(amplitude=amplitude, **where).values
         settled = measured.select("settled", amplitude=amplitude, **where).values.astype(bool)
-        moves = measured.select("moves", amplitude=amplitude, **where).values.astype(bool) & np.isfinite(response)
+        known = np.isfinite(response)
+        moves = measured.select("moves", amplitude=amplitude, **where).values.astype(bool) & known
         if not moves.any():
-            gain.plot([], [], color=color, label=label + STILL)
+            gain.plot([], [], color=color, label=label + (STILL if known.any() else FAILED))
             continue
         size = np.where(moves, decibel(abs(response)), np.nan)
         angle = np.where(moves, _unwrapped(response, moves), np.nan)

@@ -1,5 +1,6 @@
 """A stream of sines through the hybrid simulation, measured once it has settled."""
 
+import hashlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -22,6 +23,7 @@ REPEATS = (1, 2, 3)  # blocks after which a response may repeat: with the sine, 
 MOST_BLOCKS = 10
 LONGEST_BLOCK = 1.0  # s, of several periods
 THRESHOLD_PERIODS = 2
+LAWS = ("flow", "margins", "reset", "outputs_function", "tick", "period", "begin")  # functions of a HybridSystem
 HALVINGS = 60
 
 
@@ -136,6 +138,16 @@ class SineStream:
         return self.plant.system() if isinstance(self.plant, Actuator) else self.plant
 
     @cached_property
+    def model(self) -> str:
+        """A fingerprint of the model: its parts with their choices and whole numbers, or all its functions."""
+        if isinstance(self.plant, Actuator):
+            text = repr(self.plant)
+        else:
+            laws = (getattr(self.plant, name) for name in LAWS)
+            text = repr([self.plant.clocks, *(law and law.serialize() for law in laws)])
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    @cached_property
     def machine(self) -> Engine:
         """The engine that runs it."""
         return engine(self.system, EngineOptions(tolerance=self.tolerance, compiled=self.compiled, waves=1))
@@ -241,8 +253,10 @@ class SineStream:
         Raises
         ------
         ValueError
-            Where something slides at the lowest amplitude already, or nothing at the highest.
+            Where something slides at the lowest amplitude already, or nothing at the highest; without any contact.
         """
+        if not self._motions:
+            raise ValueError(f"{self.system.name}: has no contact that could stick, so no threshold")
         if not 0 < lowest < highest:
             raise ValueError(f"threshold needs 0 < lowest < highest, got {lowest:g} and {highest:g}")
         for amplitude, wanted, word in ((highest, True, "nothing slides"), (lowest, False, "a contact slides")):

@@ -7,7 +7,7 @@ from actuator.parameters import with_values
 from studies.cases import Case, built_in, load_case
 from studies.files import CaseError
 from studies.frequency.corners import WrongRequest
-from studies.tuning.study import dead_banded
+from studies.tuning.plant import dead_banded
 from studies.tuning.tuned_gains import tuned_gains
 
 TUNING = ".json"  # ending of the result of a tuning

@@ -123,12 +123,14 @@ def _free_play(actuator: Actuator, plan: BenchPlan) -> Found:
 
 def _back_driving(actuator: Actuator, plan: BenchPlan) -> Found:
     found: Numbers = {}
-    figure = None
+    figure, locked_ways = None, []
     for word, sign in (("forward", 1), ("backward", -1)):
         test = back_driving(unpowered(actuator), highest=sign * plan.torque, inputs=_of_load(plan))
         found[f"torque that drives back, {word}"] = (math.inf if test.locks else test.torque, "N m")
         figure = figure or test.plot()
-    return Found(found, figure)
+        locked_ways += [word] if test.locks else []
+    words = f"{' and '.join(locked_ways)} none was found up to {plan.torque:.4g} N m" if locked_ways else ""
+    return Found(found, figure, words)
 
 
 def _soak(actuator: Actuator, plan: BenchPlan) -> Found:

@@ -1,5 +1,6 @@
 """Limits on gain and phase over frequency, at stated amplitudes, and whether a measured response keeps to them."""
 
+import math
 from dataclasses import dataclass
 from importlib import resources
 from itertools import pairwise
@@ -92,14 +93,22 @@ class LimitCheck(NamedTuple):
 
     amplitude: float  # over the stroke
     side: str  # name of the field of Limit
-    slack: float  # smallest [dB] or [rad], negative where it is not kept; minus infinity where nothing moves
+    slack: float  # smallest [dB] or [rad], negative where it is not kept; minus infinity where there is nothing to hold
     frequency: float  # where that is [Hz]
     points: int  # that were measured within the frequencies of the limit
+    failed: int  # of them, whose simulation did
 
     @property
     def met(self) -> bool:
         """Whether it is kept at every point."""
         return self.slack >= 0
+
+    @property
+    def nothing(self) -> str:
+        """Why there is nothing to hold against the limit; empty where there is something."""
+        if math.isfinite(self.slack):
+            return ""
+        return f"{self.failed} of {self.points} simulations failed" if self.failed else "nothing moves"
 
 
 def load_mask(path: Path | None = None) -> Mask:
@@ -126,7 +135,7 @@ def checked(limit: Limit, frequencies: np.ndarray, response: np.ndarray, moves: 
     response : ndarray of complex, (n,)
         Load angle over reference.
     moves : ndarray of bool, (n,)
-        Where there is a response at all.
+        Where there is a response at all, or a simulation that failed; that has none in `response`.
     """
     inside = (frequencies >= limit.frequencies[0]) & (frequencies <= limit.frequencies[-1])
     phase = phase_of(response, moves)
@@ -142,7 +151,8 @@ def checked(limit: Limit, frequencies: np.ndarray, response: np.ndarray, moves: 
         slack = np.where(np.isnan(slack), -np.inf, slack)
         worst = int(slack.argmin())
         at = float(frequencies[inside][worst])
-        found.append(LimitCheck(limit.amplitude, side, float(slack[worst]), at, int(inside.sum())))
+        failed = int((~np.isfinite(response[inside])).sum())
+        found.append(LimitCheck(limit.amplitude, side, float(slack[worst]), at, int(inside.sum()), failed))
     return found
 
 

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from actuator import FrequencyResponse, Spectrum
+from actuator import FrequencyResponse, Sensors, Spectrum
+from gear import Backlash
 from studies.findings import rendered
 from studies.frequency.bench import TESTS
 from studies.frequency.cells import at_peak, margins_of, number, poles_of
@@ -35,7 +36,6 @@ def html(  # noqa: PLR0913, PLR0917 - all there is to show
 ) -> str:
     """The page; `pictures` are all of them in base64 by name, and what the names begin with by case."""
     found, prefixes = pictures
-    point = ", ".join(f"{name} {value:.4g}" for name, value in {"reference": 0.0, **studies[0].inputs}.items())
     shown = []
     for study in studies:
         prefix = prefixes[study.case.name]
@@ -46,7 +46,6 @@ def html(  # noqa: PLR0913, PLR0917 - all there is to show
         shown=shown,
         beside=found.get("beside", ""),
         several=any(len(study.checks) > 1 for study in studies),
-        where=f"{shown[0]['first'].capitalize()}. " if shown[0]["first"] else "",
         places=sorted({name for each in shown for name in each["pictures"] if name.startswith("places_")}),
         mask=plan.mask,
         limits=[_limit(plan, k) for k in range(len(plan.mask.limits))],
@@ -57,7 +56,6 @@ def html(  # noqa: PLR0913, PLR0917 - all there is to show
         tests=[_test(studies, name) for name in TESTS],
         parameters=_parameters(studies),
         assumed=_assumed(plan, studies),
-        point=f"{point}; the reference in the middle of the stroke, other inputs as at the end of the case's scenario",
         result=result,
         text=text,
     )
@@ -76,7 +74,8 @@ def _shown(plan: Plan, study: Study, pictures: Mapping[str, str], measured: Sequ
             for place, checks in study.checks.items()
             for check in checks
         ],
-        "first": study.words(next(iter(study.checks))),
+        "where": f"{first.capitalize()}. " if (first := study.words(next(iter(study.checks)))) else "",
+        "point": ", ".join(f"{name} {value:.4g}" for name, value in {"reference": 0.0, **study.inputs}.items()),
         "corners": _corners(study),
         "pictures": pictures,
         "measured": [spectrum.label for spectrum in measured],
@@ -131,7 +130,7 @@ def _check(plan: Plan, check: LimitCheck) -> dict[str, Any]:
     return {
         "amplitude": _amplitude(plan, check.amplitude),
         "limit": what,
-        "slack": f"{scale * check.slack:+.2f} {unit}" if math.isfinite(check.slack) else "no motion",
+        "slack": check.nothing or f"{scale * check.slack:+.2f} {unit}",
         "at": f"{check.frequency:.3g} Hz",
         "points": check.points,
         "met": check.met,
@@ -188,16 +187,65 @@ def _parameters(studies: Sequence[Study]) -> list[dict[str, Any]]:
 
 
 def _assumed(plan: Plan, studies: Sequence[Study]) -> list[str]:
-    sampled = {study.case.name: study.case.actuator.sampling is not None for study in studies}
+    """Only of what there is; of what not every case has, with the names of those that do."""
+
+    def where(has: Callable[[Study], Any]) -> str | None:
+        names = [study.case.name for study in studies if has(study)]
+        if len(names) == len(studies):
+            return ""
+        return f" ({', '.join(names)})" if names else None
+
+    sentences = [
+        (
+            "Contacts of teeth after F. L. J. van der Linden, with friction averaged over the path of contact",
+            where(lambda study: any(mesh.friction for mesh in study.case.actuator.gear.meshes.values())),
+        ),
+        (
+            "Teeth with backlash push and never pull",
+            where(
+                lambda study: any(isinstance(m.elasticity, Backlash) for m in study.case.actuator.gear.meshes.values())
+            ),
+        ),
+        (
+            "Contacts truly stick, and slide off at their breakaway",
+            where(lambda study: any(mode.endswith(".motion") for mode in study.case.actuator.system().modes)),
+        ),
+        ("Averaged inverter", where(lambda study: study.case.actuator.inverter is not None)),
+        (
+            "Decoupling with the motor parameters given",
+            where(
+                lambda study: (
+                    getattr(study.case.actuator.controller, "current", None) is not None
+                    and getattr(study.case.actuator.controller, "decoupling", False)
+                )
+            ),
+        ),
+        ("Controllers in continuous time", where(lambda study: study.case.actuator.sampling is None)),
+        ("Controllers sampled", where(lambda study: study.case.actuator.sampling is not None)),
+        (
+            "Linear models take sensors to read between their counts, without noise; the simulations take them as they "
+            "are",
+            where(lambda study: study.case.actuator.sensors != Sensors()),
+        ),
+        ("Unpowered: no torque from the motor", where(lambda study: "unpowered" in study.stiffness)),
+        (
+            "Unpowered: the winding is open",
+            where(
+                lambda study: "unpowered" in study.stiffness and hasattr(study.case.actuator.motor, "resistance"),
+            ),
+        ),
+        (
+            "Temperatures act on laws that have an oil, and otherwise as the corners say, parameter by parameter",
+            where(lambda study: len(study.sets) > 1),
+        ),
+        (
+            "Corners and bias loads are those of the sines of the reference; all else is of the actuator as it is: "
+            "linear models, loops, margins, stiffness and bench tests (but the one that is named after the corners)",
+            where(lambda study: len(study.checks) > 1),
+        ),
+    ]
     return [
         f"Stroke of {math.degrees(plan.stroke):.4g} deg from end to end; amplitudes are peak values, in parts of it.",
-        "Gear contacts after F. L. J. van der Linden with friction averaged over the path of contact, true sticking, "
-        "and teeth that push and never pull.",
-        "Averaged inverter; controllers "
-        + ", ".join(f"{'sampled' if is_so else 'in continuous time'} ({name})" for name, is_so in sampled.items())
-        + "; decoupling with the motor parameters given.",
-        "Linear models take sensors to read between their counts, without noise; the simulations take them as "
-        "they are.",
         "A sine is settled where two measurements in a row agree within 0.05 % of the fundamental; it starts at "
         "rest, at its crest. Phase and gain are those of the fundamental.",
         "Torques on the load: "
@@ -206,9 +254,7 @@ def _assumed(plan: Plan, studies: Sequence[Study]) -> list[str]:
             f"{study.torque:.4g} N m at most)"
             for study in studies
         )
-        + ". Unpowered: open circuit, no torque from the motor.",
-        "Temperatures act on laws that have an oil, and otherwise as the corners say, parameter by parameter.",
-        "Corners and bias loads are those of the sines of the reference; all else is of the actuator as it is: linear "
-        "models, loops, margins, stiffness and bench tests (but the one that is named after the corners).",
+        + ".",
         "Mask limits are held at measured points only.",
+        *(f"{sentence}{names}." for sentence, names in sentences if names is not None),
     ]

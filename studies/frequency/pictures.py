@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from actuator import Spectrum
-from actuator.response.response_plots import READING, STILL, draw_responses, plain_hertz
+from actuator.response.response_plots import FAILED, READING, STILL, draw_responses, plain_hertz
 from studies.frequency.corners import Place
 from studies.frequency.mask import Mask, phase_of
 from studies.frequency.study import Study
@@ -73,7 +73,7 @@ def _legend(figure: Figure, panels: Iterable[Axes]) -> None:
     for axes in panels:
         handles |= {label: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
     for label in list(handles):
-        moves_elsewhere = label.endswith(STILL) and label.removesuffix(STILL) in handles
+        moves_elsewhere = label.endswith((STILL, FAILED)) and label.rpartition(":")[0] in handles
         if moves_elsewhere or label.startswith(CUT):
             del handles[label]
     figure.legend(
@@ -86,11 +86,15 @@ def plot_beside(studies: Sequence[Study], amplitudes: Sequence[float]) -> Figure
     figure = Figure(figsize=(9, 7), layout="constrained")
     gain, phase = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     for k, study in enumerate(studies):
+        place = study.words(next(iter(study.checks)))
+        name = ", ".join(part for part in (study.case.name, place) if part)
         hertz = study.family.data.frequency.values
         for amplitude, style in zip(amplitudes[:MOST_AMPLITUDES], STYLES, strict=False):
             response, moves = (study.family.select(name, amplitude=amplitude).values for name in ("response", "moves"))
-            moves = moves.astype(bool) & np.isfinite(response)
-            label = f"{study.case.name}, {math.degrees(amplitude):.3g} deg{'' if moves.any() else ': no motion'}"
+            known = np.isfinite(response)
+            moves = moves.astype(bool) & known
+            word = "" if moves.any() else STILL if known.any() else FAILED
+            label = f"{name}, {math.degrees(amplitude):.3g} deg{word}"
             size = np.full(len(hertz), np.nan)
             size[moves] = 20 * np.log10(abs(response[moves]))
             angle = np.degrees(phase_of(response, moves))
@@ -103,9 +107,9 @@ def plot_beside(studies: Sequence[Study], amplitudes: Sequence[float]) -> Figure
     plain_hertz(phase)
     for axes in (gain, phase):
         axes.grid(alpha=0.3, which="both")
-    first = studies[0].words(next(iter(studies[0].checks)))
-    place = f", {first}" if first else ""
-    gain.set_title(f"load angle over reference{place}; a line ends where nothing moves", fontsize="medium")
+    gain.set_title(
+        "load angle over reference; a line ends where nothing moves or a simulation failed", fontsize="medium"
+    )
     figure.legend(
         *gain.get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize="small", frameon=False
     )

@@ -7,6 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from actuator import LiftedMargins, Margins, Spectrum
@@ -108,15 +109,22 @@ def sentences(plan: Plan, studies: Sequence[Study]) -> list[str]:
         if study.tests["hold"]["words"]:
             found.append(f"{name}, held after a step of 2 %: {study.tests['hold']['words']}.")
         if study.family.notes:
-            settled = study.family.data.settled
-            found.append(f"{name}: {int((~settled.astype(bool)).sum())} of {settled.size} sines have not settled.")
+            settled, failed = study.family.data.settled.values.astype(bool), _failed(study)
+            for count, words in ((~settled & ~failed).sum(), "have not settled"), (failed.sum(), "have failed"):
+                if count:
+                    found.append(f"{name}: {count} of {settled.size} sines {words}.")
     return found
+
+
+def _failed(study: Study) -> np.ndarray:
+    """Whose simulation did."""
+    return ~np.isfinite(study.family.data.response.isel(output=0).values)
 
 
 def _missed(plan: Plan, check: LimitCheck) -> str:
     what, scale, unit = SIDES[check.side]
     at = f"{math.degrees(check.amplitude * plan.stroke):.3g} deg and {check.frequency:.3g} Hz"
-    by = f"by {-scale * check.slack:.2g} {unit}" if math.isfinite(check.slack) else "nothing moves"
+    by = check.nothing or f"by {-scale * check.slack:.2g} {unit}"
     return f"{what}, at {at}, {by}"
 
 

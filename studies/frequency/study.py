@@ -28,7 +28,7 @@ from studies.frequency.corners import Place, WrongRequest
 from studies.frequency.linear import OUTPUT, LinearPart, closed_at, linear_part
 from studies.frequency.mask import LimitCheck, checked
 from studies.frequency.plan import PARTS, Plan
-from studies.kept import Kept, fingerprint, model_of
+from studies.kept import Kept, actuator_of, fingerprint
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,7 +148,7 @@ def study(
         except NoEquilibrium as error:
             missing[f"linear models, {place.corner}, bias {place.bias:+g} N m"] = str(error)
     work = _Work(actuator, inputs, kept, jobs, progress)
-    model = model_of({p.name: float(p.default) for p in actuator.system().parameters}, repr(actuator))
+    model = actuator_of(actuator)
     bench = BenchPlan(
         stroke=plan.stroke, torque=torque, frequencies=plan.threshold_frequencies, sets=sets, inputs=inputs
     )

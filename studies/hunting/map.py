@@ -1,13 +1,10 @@
 """A map of hunting over two names and any number of corners: every point simulated and classified, on all cores."""
 
-import hashlib
-import json
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import as_completed
 from dataclasses import dataclass
 from functools import cache
-from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
@@ -20,6 +17,7 @@ from actuator.response.processes import processes
 from actuator.simulation.run import Run
 from studies.cases import Case, load_case
 from studies.hunting.settings import Setting, meaning, parameters_of
+from studies.kept import actuator_of
 from studies.stages import Stages
 
 if TYPE_CHECKING:
@@ -109,17 +107,8 @@ class Plan:
     def fingerprint(self) -> str:
         """Of all that decides the points."""
         case = load(self.case)
-        text = json.dumps(
-            {
-                "parameters": [(q.name, q.default) for q in case.actuator.system().parameters],
-                "actuator": repr(case.actuator),
-                "inputs": repr(case.inputs),
-                "plan": [repr(part) for part in (self.x, self.y, self.corners, self.duration or case.duration)],
-                "casadi": metadata.version("casadi"),
-                "method": (POINTS, SMALL, LONGEST),
-            }
-        )
-        return hashlib.sha256(text.encode()).hexdigest()[:12]
+        plan = (self.x, self.y, self.corners, self.duration or case.duration)
+        return actuator_of(case.actuator, case.inputs, plan)
 
     def check(self) -> None:
         """Raise KeyError or ValueError where a name is unknown or a value breaks a rule of its component."""

@@ -9,11 +9,11 @@ A factor does not take breakaway friction below the sliding friction of its cont
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from typing import NamedTuple
 
-from actuator.hunting.margins import FLOORS
+from actuator.hunting.margins import at_least_sliding
 from actuator.hybrid import HybridSystem
 from actuator.parameters import require_known
 
@@ -90,16 +90,5 @@ def parameters_of(system: HybridSystem, settings: Sequence[Setting]) -> dict[str
         stands_for = meaning(system, name)
         for each in stands_for.parameters:
             before = found.get(each, defaults[each])
-            found[each] = max(value * before, _floor(each, defaults | found)) if stands_for.factor else value
+            found[each] = at_least_sliding(each, value * before, defaults | found) if stands_for.factor else value
     return found
-
-
-def _floor(name: str, values: Mapping[str, float]) -> float:
-    """The least value that a factor may lead to."""
-    for ending, other in FLOORS.items():
-        if name.endswith(ending):
-            others = other if isinstance(other, tuple) else (other,)
-            return next(
-                (values[n] for n in (name.removesuffix(ending) + o for o in others) if n in values), float("-inf")
-            )
-    return float("-inf")

@@ -9,14 +9,17 @@ import numpy as np
 
 from actuator.actuator import Actuator
 from actuator.hunting.decide import decide
-from actuator.hunting.verdict import REST
+from actuator.hunting.margins import SLIDING, at_least_sliding
+from actuator.hunting.verdict import REST, Hunting, classify
 from actuator.response.sine_stream import SinePoint, SineStream
+from actuator.response.standstill import rest_of
 from actuator.response.sweep import sweep
 from actuator.simulation.engine import SimulationError
+from actuator.simulation.run import Run
 from actuator.simulation.signals import Step
+from actuator.simulation.simulate import simulate
 from studies.kept import fingerprint
 from studies.specification import Corner, Demand
-from studies.tuning.corners import BREAKAWAY, sliding_of
 from studies.tuning.plant import defaults_of
 
 STEPS = (0.1, 1.0, 10.0)  # of the demanded amplitude: a small move, the move itself, a large one
@@ -50,9 +53,11 @@ class CornerCheck:
     standing_error : float
         Largest error at rest [rad], of those runs that rest.
     followed : float
-        Load angle over reference at the demanded bandwidth and amplitude [-].
+        Load angle over reference at the demanded bandwidth and amplitude [-]; zero where the simulation failed.
+    settled : bool
+        Whether that sine has settled.
     overshoot : float
-        Of the step of the demanded amplitude over its size [-].
+        Of the step of the demanded amplitude, over the way from where the load was at rest [-].
     peak_current, peak_torque : float
         Of the motor in the step of the demanded amplitude, once it has begun [A], [N m]; nan where there is no current.
     """
@@ -62,6 +67,7 @@ class CornerCheck:
     cycle: float
     standing_error: float
     followed: float
+    settled: bool
     overshoot: float
     peak_current: float
     peak_torque: float
@@ -99,30 +105,38 @@ class Bench:
             found = self.stream.measure(
                 SinePoint(amplitude=trial.size, frequency=trial.frequency, parameters=trial.parameters)
             )
-            value = complex(*found.harmonics[0][1]) / trial.size
-            return {"followed": abs(value), "settled": found.settled}
+            value = abs(complex(*found.harmonics[0][1])) / trial.size
+            return {"followed": value if math.isfinite(value) else 0.0, "settled": found.settled}
         try:
-            run, hunting = decide(
-                self.plant,
-                DURATION,
-                inputs={"reference": Step(time=BEFORE, after=trial.size)},
-                longest=LONGEST,
-                parameters=trial.parameters,
-                resolution=RESOLUTION,
-            )
+            first, run, hunting = self.stepped(trial)
         except SimulationError as error:
             return {"verdict": "failed", "reason": str(error)}
-        after = run.t >= BEFORE
-        current = run["current"][after] if "current" in run.signals else np.array([math.nan])
+        after = first.t >= BEFORE
+        current = first["current"][after] if "current" in first.signals else np.array([math.nan])
+        load = first["load_angle"][after]
         return {
             "verdict": hunting.verdict,
             "reason": hunting.reason,
             "amplitude": hunting.amplitude_rad if hunting.cycles else 0.0,
             "error": abs(float(run["position_error"][-1])) if hunting.verdict == REST else 0.0,
-            "overshoot": float(np.max(run["load_angle"])) / trial.size - 1,
+            "overshoot": float((load.max() - load[0]) / (trial.size - load[0])) - 1,
             "peak_current": float(abs(current).max()),
-            "peak_torque": float(abs(run["motor_torque"][after]).max()),
+            "peak_torque": float(abs(first["motor_torque"][after]).max()),
         }
+
+    def stepped(self, trial: Trial) -> tuple[Run, Run, Hunting]:
+        """The step from rest, the run that decides (the same, or what follows it), and the verdict."""
+        common = {"parameters": trial.parameters, "resolution": RESOLUTION}
+        start = rest_of(self.plant, {"reference": 0.0}, trial.parameters)
+        step = Step(time=BEFORE, after=trial.size)
+        first = simulate(self.plant, DURATION, inputs={"reference": step}, start=start, **common)
+        hunting = classify(first)
+        if hunting.decided:
+            return first, first, hunting
+        left = (LONGEST - 1) * DURATION
+        more, held = min(hunting.longer_s, left), {"reference": trial.size}
+        run, hunting = decide(self.plant, more, inputs=held, longest=left / more, start=first.state(), **common)
+        return first, run, hunting
 
 
 def step_trials(
@@ -131,10 +145,8 @@ def step_trials(
     """Steps of all sizes in a corner, with a factor on breakaway friction; that is never below sliding friction."""
     parameters = corner.parameters | dict(design)
     values = dict(defaults) | parameters
-    sticky = {}
-    for name in (name for name in values if name.endswith(tuple(BREAKAWAY))):
-        sliding = sliding_of(name, values)
-        sticky[name] = max(factor * values[name], values[sliding] if sliding else 0.0)
+    names = [name for name in values if name.endswith(tuple(SLIDING))]
+    sticky = {name: at_least_sliding(name, factor * values[name], values) for name in names}
     return {f"x{part:g}, {_label(factor)}": Trial(STEP, parameters | sticky, part * demand.sine) for part in STEPS}
 
 
@@ -196,6 +208,7 @@ def _summed(corner: str, found: Mapping[str, dict[str, Any]]) -> CornerCheck:
         cycle=max(result.get("amplitude", 0.0) for result in plain),
         standing_error=max(result.get("error", 0.0) for result in steps.values()),
         followed=found[SINE]["followed"],
+        settled=found[SINE]["settled"],
         overshoot=own.get("overshoot", math.nan),
         peak_current=own.get("peak_current", math.nan),
         peak_torque=own.get("peak_torque", math.nan),

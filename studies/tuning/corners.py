@@ -6,13 +6,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from actuator.actuator import Actuator
+from actuator.hunting.margins import SLIDING, sliding_of
+from actuator.linear.balance import rates_function, rounding
 from actuator.linear.modes import mode_models
 from actuator.linear.operating_point import NoEquilibrium, OperatingPoint
-from actuator.linear.trim import rates_function, rounding, trim
+from actuator.linear.trim import trim
 from studies.specification import Corner
 from studies.tuning.plant import defaults_of
-
-BREAKAWAY = {".breakaway": (".coulomb",), ".static": (".sliding", ".coulomb")}  # and what it becomes once it slides
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,14 +76,8 @@ def corner_modes(plant: Actuator, corner: Corner, stiction: float, start: Mappin
 
 def slides_as_it_breaks_away(values: Mapping[str, float], factor: float) -> dict[str, float]:
     """Parameters with breakaway friction times a factor, and sliding friction equal to it."""
-    sticky = {name: factor * value for name, value in values.items() if name.endswith(tuple(BREAKAWAY))}
+    sticky = {name: factor * value for name, value in values.items() if name.endswith(tuple(SLIDING))}
     return sticky | {other: sticky[name] for name in sticky if (other := sliding_of(name, values)) is not None}
-
-
-def sliding_of(name: str, values: Mapping[str, float]) -> str | None:
-    """Name of the sliding friction that belongs to a breakaway friction; None where a law has none as a number."""
-    ending = next(each for each in BREAKAWAY if name.endswith(each))
-    return next((other for part in BREAKAWAY[ending] if (other := name.removesuffix(ending) + part) in values), None)
 
 
 def moved(point: OperatingPoint, gains: Mapping[str, float]) -> OperatingPoint:

@@ -146,6 +146,7 @@ def design(
     start: Mapping[str, float],
     specification: Specification,
     tightening: Mapping[str, float] | None = None,
+    first: Mapping[str, float] | None = None,
 ) -> Design:
     """Gains with the least standing error that meet all demands on the linear models.
 
@@ -154,11 +155,13 @@ def design(
     everywhere : sequence of CornerModes
         All corners.
     start : mapping of str to float
-        Gains to begin with.
+        Gains about which those of the design lie, within the range of the specification.
     specification : Specification
         Demands and range.
     tightening : mapping of str to float
         Factors on demands by name of the measure.
+    first : mapping of str to float
+        Gains within that range to begin with; else `start`.
 
     Raises
     ------
@@ -168,8 +171,9 @@ def design(
     tightening = dict(tightening or {})
     demand = specification.demand
     demand = replace(demand, standing_error=demand.standing_error / tightening.get(FROZEN, 1.0))
-    problem, gains = _Problem(start, demand, tightening), dict(start)
-    y, reach = np.zeros(len(start) + 1), math.log(specification.tuning.range)
+    problem, gains = _Problem(start, demand, tightening), dict(first or start)
+    y = np.array([*(math.log(gains[name] / value) for name, value in start.items()), 0.0])
+    reach = math.log(specification.tuning.range)
     by_name = {modes.corner.name: modes for modes in everywhere}
     found = _everything(everywhere, gains, demand, tightening)
     deciding = [each for each in worst(found).values() if each.slack < NEAR or each.name == "slip"]

@@ -44,9 +44,14 @@ def gain_margin(curves: Curves, at: str) -> Room:
 
 
 def phase_and_delay_margin(curves: Curves, at: str) -> tuple[Room, Room]:
-    """The smallest lag [rad] and delay [s] that make the loop unstable, negative where it is."""
-    frequencies, values = curves.frequencies(at), curves.loop(at)
-    phase = delay = Room(math.pi, np.zeros(len(curves.model.gains)))
+    """The smallest lag or lead [rad], and the smallest delay [s], that make the loop unstable.
+
+    Both are negative where it is unstable: then by how much it is, of the crossing that is nearest. Without a crossing
+    the phase is pi, and the delay infinite; of an unstable loop zero, as no delay makes it stable.
+    """
+    frequencies, values, stable = curves.frequencies(at), curves.loop(at), curves.model.stable
+    sign, none = (1.0 if stable else -1.0), np.zeros(len(curves.model.gains))
+    phase, delay = Room(sign * math.pi, none), Room(math.inf if stable else -math.inf, none)
     for k in np.flatnonzero((abs(values[:-1]) - 1) * (abs(values[1:]) - 1) < 0).tolist():
         w, found = _refined(curves, at, frequencies[k : k + 2], _unity)
         value = found.value[0]
@@ -56,11 +61,14 @@ def phase_and_delay_margin(curves: Curves, at: str) -> tuple[Room, Room]:
         change, by_frequency = found.slopes[0] / value, found.by_frequency[0] / value
         shift = -np.real(change) / np.real(by_frequency)  # of the crossing
         slopes = np.imag(change) + np.imag(by_frequency) * shift
-        if lag < phase.size:
-            phase = Room(lag, slopes)
-        if lag / w < delay.size:
-            delay = Room(lag / w, (slopes - lag / w * shift) / w)
-    return phase, delay
+        if abs(lag) < abs(phase.size):
+            phase = Room(sign * abs(lag), sign * math.copysign(1.0, lag) * slopes)
+        # a delay only ever lags: where a lead is nearest, it takes the rest of the turn
+        later = lag % (2 * math.pi) if stable else -abs(lag)
+        turn = slopes if stable else -math.copysign(1.0, lag) * slopes
+        if abs(later / w) < abs(delay.size):
+            delay = Room(later / w, (turn - later / w * shift) / w)
+    return phase, delay if math.isfinite(delay.size) or stable else Room(0.0, none)
 
 
 def _real(response: Response) -> tuple[float, float]:

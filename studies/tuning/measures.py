@@ -41,7 +41,9 @@ from studies.tuning.plant import (
 )
 
 POINTS = 300  # of a step response
+FINER, FINE = 2, 11  # times that the least stiffness is sought on a finer grid, of so many points; odd: best included
 PERIODS = 4.0  # of the demanded bandwidth, which a step response is looked at for
+AMPLE = 1e6  # delay margin over its limit where no delay makes the loop unstable
 EFFORT_STEP = 2.5e-4  # s, between the points at which current or torque are looked at
 
 
@@ -137,9 +139,8 @@ class _View(NamedTuple):
             limit = demand.phase_margin
             found.append(self._measure(f"phase margin at {words}", phase, limit, "rad", phase - limit, slopes))
             limit = demand.delay_margin
-            found.append(
-                self._measure(f"delay margin at {words}", delay, limit, "s", delay / limit - 1, by_gains / limit)
-            )
+            slack = min(delay / limit, AMPLE) - 1
+            found.append(self._measure(f"delay margin at {words}", delay, limit, "s", slack, by_gains / limit))
         return found
 
     def responses(self) -> list[Measure]:
@@ -169,9 +170,12 @@ class _View(NamedTuple):
         return self._measure("overshoot", over, limit, "-", limit - over, -found.slopes)
 
     def _stiffness(self) -> Measure:
-        yields = self.curves.response("load_torque", "load_angle")
-        worst = self.curves.frequencies()[int(np.argmax(abs(yields)))]
-        found = self.curves.model.response("load_torque", "load_angle", [worst])
+        grid, yields = self.curves.frequencies(), self.curves.response("load_torque", "load_angle")
+        for _ in range(FINER):
+            best = int(np.argmax(abs(yields)))
+            grid = np.geomspace(grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)], FINE)
+            yields = self.curves.model.response("load_torque", "load_angle", grid).value
+        found = self.curves.model.response("load_torque", "load_angle", [grid[int(np.argmax(abs(yields)))]])
         value, limit = 1 / abs(found.value[0]), self.demand.stiffness
         slopes = -np.real(found.slopes[0] / found.value[0])
         return self._measure("stiffness", value, limit, "N m/rad", math.log(value / limit), slopes)

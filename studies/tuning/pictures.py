@@ -5,6 +5,7 @@ import math
 import numpy as np
 from matplotlib.figure import Figure
 
+from actuator.response.standstill import rest_of
 from actuator.simulation.signals import Step
 from actuator.simulation.simulate import simulate
 from studies.tuning.check import BEFORE
@@ -13,6 +14,7 @@ from studies.tuning.measures import worst
 from studies.tuning.models import curves_at
 from studies.tuning.plant import for_linear_models, loops_of
 from studies.tuning.stiction import MOST
+from studies.tuning.stiction import STEP as RUNG
 from studies.tuning.study import Tuned
 
 VIEW, HOLD = 1.0, 12.0  # s of the step that are shown, and of the hold behind it
@@ -27,11 +29,13 @@ def steps_picture(tuned: Tuned) -> Figure:
     figure = Figure(figsize=(9, 5.5), layout="constrained")
     panels = figure.subplots(2, 2, sharex="col", width_ratios=(1, 1.6))
     for label, design, color in (("before", tuned.before, RED), ("tuned", tuned.parameters, GREEN)):
+        parameters = corner.parameters | dict(design)
         run = simulate(
             tuned.plant,
             HOLD,
             inputs={"reference": Step(time=BEFORE, after=size)},
-            parameters=corner.parameters | dict(design),
+            start=rest_of(tuned.plant, {"reference": 0.0}, parameters),
+            parameters=parameters,
             resolution=2e-3,
         )
         for column, end in enumerate((VIEW, HOLD)):
@@ -100,7 +104,11 @@ def margins_picture(tuned: Tuned) -> Figure:
         axes.barh(places, widths, height=0.36, color=color, label=label)
         for place, each in zip(places, found, strict=True):
             words = (
-                f"> {MOST:g}" if each.hunts is None else f"{each.rests:.2f}" if each.rests else "hunts at any factor"
+                f"> {MOST:g}"
+                if each.hunts is None
+                else f"{each.rests:.2f}"
+                if each.rests
+                else "hunts at the lowest factor"
             )
             axes.annotate(
                 words, (each.rests or 0.0, place), xytext=(4, 0), textcoords="offset points", va="center", fontsize=8
@@ -109,7 +117,10 @@ def margins_picture(tuned: Tuned) -> Figure:
     axes.axvline(1.0, color="#888888", lw=1)
     axes.axvline(demanded, color="#222222", ls="--", lw=1, label=f"demanded, {demanded:g}")
     axes.set_yticks(np.arange(count)[::-1], [corner.name for corner in tuned.corners], fontsize="small")
-    axes.set_xlabel("factor on all breakaway friction up to which every step comes to rest")
+    axes.set_xlabel(
+        "factor on all breakaway friction up to which every step comes to rest;\n"
+        f"hunting between factors less than {100 * (RUNG - 1):.0f} % apart can be missed"
+    )
     axes.set_xlim(0, MOST * 1.1)
     figure.legend(loc="outside upper right", ncols=3, fontsize="small")
     return figure
@@ -120,7 +131,9 @@ def trade_off_picture(tuned: Tuned) -> Figure:
     figure = Figure(figsize=(7, 4), layout="constrained")
     axes = figure.subplots()
     margin, error = np.array(tuned.trade_off).T
-    axes.plot(margin, np.degrees(error), "o-", color=GREEN, label="least that meets all other demands")
+    axes.plot(
+        margin, np.degrees(error), "o-", color=GREEN, label="least on the linear models, in the corners that decide"
+    )
     demand = tuned.specification.demand
     axes.plot(
         demand.stiction_margin,

@@ -50,19 +50,27 @@ def sentences(tuned: Tuned) -> list[str]:
         for checks in (tuned.before_checks, last.checks)
     )
     slow, still_slow = (min(check.followed for check in checks) for checks in (tuned.before_checks, last.checks))
+    unsettled = [
+        f"{when} at {check.corner}"
+        for when, checks in (("before", tuned.before_checks), ("after", last.checks))
+        for check in checks
+        if not check.settled
+    ]
     gains = ", ".join(f"{name} {tuned.before[name]:.4g} -> {value:.4g}" for name, value in tuned.design.gains.items())
     dead = dead_band_of(tuned.original)
     unit = "rad/s of the motor" if ".speed." in dead else "rad"
     return [
         f"gains: {gains}; dead band of the integral {tuned.parameters[dead]:.4g} {unit}, which lets the load rest up "
         f"to {math.degrees(tuned.design.standing_error):.3g} deg from its reference",
-        f"hunting, simulated with breakaway friction up to {factor:g} times: in {hunting} of {count} corners before, "
-        f"in {now} after",
-        f"the steps begin to hunt, with one factor on all breakaway friction, {_begins(tuned.margins_before)} before, "
-        f"{_begins(tuned.margins)} after; in steps of {100 * (STEP - 1):.0f} %, then by bisection to "
+        f"hunting or undecided, simulated with breakaway friction up to {factor:g} times: in {hunting} of {count} "
+        f"corners before, in {now} after",
+        "the steps begin to hunt or not to decide, with one factor on all breakaway friction, "
+        f"{_begins(tuned.margins_before)} before, {_begins(tuned.margins)} after; tried from the lowest factor in "
+        f"steps of {100 * (STEP - 1):.0f} % (hunting in a narrower window can be missed), then by bisection to "
         f"{100 * (ACCURACY - 1):.0f} %",
         f"load over reference at {demand.bandwidth:g} Hz and {math.degrees(demand.sine):.3g} deg, in the worst corner: "
         f"{slow:.3f} before, {still_slow:.3f} after ({1 / math.sqrt(2):.3f} demanded)",
+        *([f"of these sines have failed or not settled: {'; '.join(unsettled)}"] if unsettled else []),
         *(
             f"{each.name}{f' ({each.corner}, {each.mode})' if each.mode else ''} decides: {each.cost}"
             for each in tuned.design.active
@@ -120,8 +128,8 @@ def _corners_csv(tuned: Tuned) -> str:
     rows = io.StringIO()
     out = csv.writer(rows)
     names = list(tuned.before_checks[0].verdicts)
-    measured = ("cycle", "standing_error", "followed", "overshoot", "peak_current", "peak_torque")
-    units = ("_rad", "_rad", "", "", "_A", "_Nm")
+    measured = ("cycle", "standing_error", "followed", "settled", "overshoot", "peak_current", "peak_torque")
+    units = ("_rad", "_rad", "", "", "", "_A", "_Nm")
     heads = [name + unit for name, unit in zip(measured, units, strict=True)]
     out.writerow(["design", "corner", *names, *heads, "rests_up_to_factor", "hunts_from_factor"])
     designs = (
@@ -156,6 +164,7 @@ def _html(tuned: Tuned, case: Case, result: dict[str, Any], text: list[str], pic
         effort="torque, N m" if math.isnan(tuned.rounds[-1].checks[0].peak_current) else "current, A",
         sampled=tuned.original.sampling is not None,
         accuracy=f"{100 * (ACCURACY - 1):.0f} %",
+        rung=f"{100 * (STEP - 1):.0f} %",
         floor=1 / math.sqrt(2),
     )
 
@@ -168,12 +177,16 @@ def _line(before: Measure, after: Measure) -> dict[str, Any]:
         "unit": "" if unit == "-" else unit,
         "sign": "<=" if after.name in BELOW else ">=",
         "limit": f"{before.limit * factor:.4g}",
-        "before": f"{before.value * factor:.4g}",
+        "before": _number(before.value * factor),
         "before_met": before.met,
-        "after": f"{after.value * factor:.4g}",
+        "after": _number(after.value * factor),
         "met": after.slack >= -1e-3,  # noqa: PLR2004 - as the optimization ends
         "where": f"{after.corner}, {after.mode}",
     }
+
+
+def _number(value: float) -> str:
+    return "none" if math.isinf(value) else f"{value:.4g}"
 
 
 def _simulated(check: CornerCheck, factor: float, margin: StictionMargin) -> dict[str, Any]:
@@ -183,7 +196,7 @@ def _simulated(check: CornerCheck, factor: float, margin: StictionMargin) -> dic
         "good": not (check.hunts(1.0) or check.hunts(factor)),
         "cycle": f"{math.degrees(check.cycle):.3g}" if check.cycle else "",
         "error": f"{math.degrees(check.standing_error):.3g}",
-        "followed": f"{check.followed:.3f}",
+        "followed": f"{check.followed:.3f}{'' if check.settled else ', not settled'}",
         "follows": check.followed >= 1 / math.sqrt(2),
         "overshoot": f"{100 * max(check.overshoot, 0.0):.1f}",
         "effort": f"{check.peak_torque if math.isnan(check.peak_current) else check.peak_current:.3g}",

@@ -12,17 +12,18 @@ A. Saltelli et al., "Variance based sensitivity analysis of model output", Compu
 import math
 from collections.abc import Callable, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from statistics import NormalDist
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from actuator.hunting.margins import sliding_of
 from studies.kept import model_of
 from studies.specification import Tolerance, matching
 
 TAILS = 1e-3  # of a normal distribution, on each side, that are left out: three sigma
 CONFIDENCE = 0.95
-BREAKAWAY = {".breakaway": ".coulomb", ".static": ".sliding"}
 
 
 class MissingLibrary(ImportError):
@@ -114,11 +115,11 @@ def spread(values: Mapping[str, float], tolerances: Sequence[Tolerance], row: Se
     for tolerance, factor in zip(tolerances, row, strict=True):
         for name in matching(tolerance.parameter, values):
             found[name] = factor * found.get(name, values[name])
-    for ending, sliding in BREAKAWAY.items():
-        for name in [name for name in values if name.endswith(ending)]:
-            other = name.removesuffix(ending) + sliding
-            if other in values and (name in found or other in found):
-                found[name] = max(found.get(name, values[name]), found.get(other, values[other]))
+    now = {**values, **found}
+    for name in values:
+        other = sliding_of(name, values)
+        if other is not None and (name in found or other in found):
+            found[name] = max(now[name], now[other])
     return found
 
 
@@ -172,11 +173,9 @@ def robustness(  # noqa: PLR0913 - the study, and how it is run
         raise ValueError("robustness needs at least one tolerance: add [[tolerances]] to the specification")
     if base < 2 or base & (base - 1):  # noqa: PLR2004 - Sobol' points fill the space in powers of two
         raise ValueError(f"robustness: base must be a power of two, got {base}")
-    sample, analyze = _salib()
     names = [tolerance.parameter for tolerance in tolerances]
-    problem = {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
-    shares = sample(problem, base, calc_second_order=False, scramble=True, seed=seed)
-    rows = factors(shares, tolerances)
+    sample, influences_of = _scheme(names, seed)
+    rows = factors(sample(base), tolerances)
     sets = [{**nominal, **spread(nominal, tolerances, row.tolist())} for row in rows]
     keys = [model_of(values, about) for values in sets]
     found = sweep(work, dict(zip(keys, sets, strict=True)), done=done, workers=workers, progress=progress)
@@ -187,19 +186,18 @@ def robustness(  # noqa: PLR0913 - the study, and how it is run
         name: wilson(sum(bool(happens(result)) for result in independent), len(independent))
         for name, happens in events.items()
     }
-    influences = {
-        measure: _influences(analyze, problem, np.array([float(result[measure]) for result in results]), seed)
-        for measure in measures
-    }
     return Robustness(
         probabilities=probabilities,
-        influences=influences,
+        influences={name: influences_of(np.array([float(result[name]) for result in results])) for name in measures},
         points=tuple(dict(zip(names, row.tolist(), strict=True)) for row in rows),
         results=tuple(results),
     )
 
 
-def _salib() -> tuple[Callable[..., Any], Callable[..., Any]]:
+def _scheme(
+    names: Sequence[str], seed: int
+) -> tuple[Callable[[int], np.ndarray], Callable[[np.ndarray], tuple[Influence, ...]]]:
+    """Saltelli's: shares between 0 and 1 from the points of a block, and influences from a measure at all points."""
     try:
         from SALib.analyze import sobol as analysis
         from SALib.sample import sobol as sampling
@@ -207,17 +205,17 @@ def _salib() -> tuple[Callable[..., Any], Callable[..., Any]]:
         raise MissingLibrary(
             "robustness needs SALib for its sensitivities; install it with: pip install 'geared-actuator[robustness]'"
         ) from None
-    return sampling.sample, analysis.analyze
+    problem = {"num_vars": len(names), "names": list(names), "bounds": [[0.0, 1.0]] * len(names)}
+    sample = partial(sampling.sample, problem, calc_second_order=False, scramble=True, seed=seed)
+    analyze = partial(analysis.analyze, problem, calc_second_order=False, seed=seed)
+    return sample, partial(_influences, names, analyze)
 
 
-def _influences(
-    analyze: Callable[..., Any], problem: dict[str, Any], values: np.ndarray, seed: int
-) -> tuple[Influence, ...]:
+def _influences(names: Sequence[str], analyze: Callable[..., Any], values: np.ndarray) -> tuple[Influence, ...]:
     """Sobol' indices; all zero where nothing varies."""
-    names = problem["names"]
     if np.ptp(values) <= 1e-12 * abs(values).max(initial=0.0):
         return tuple(Influence(name, 0.0, 0.0, 0.0, 0.0) for name in names)
-    found = analyze(problem, values, calc_second_order=False, seed=seed)
+    found = analyze(values)
     each = zip(names, found["S1"], found["ST"], found["S1_conf"], found["ST_conf"], strict=True)
     rows = [Influence(name, *(float(number) for number in numbers)) for name, *numbers in each]
     return tuple(sorted(rows, key=lambda row: -row.total))

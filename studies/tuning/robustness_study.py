@@ -19,14 +19,13 @@ from studies.findings import Findings, rendered, versions
 from studies.kept import model_of
 from studies.specification import Corner, Demand, Specification, matching
 from studies.tuning.check import SINE, STEP, Bench, Trial
-from studies.tuning.plant import defaults_of
+from studies.tuning.plant import dead_banded, defaults_of
 from studies.tuning.robustness import CONFIDENCE, Probability, Robustness, robustness
-from studies.tuning.study import dead_banded
 from studies.tuning.tuned_gains import tuned_gains
 
 STEPS = (0.1, 1.0)  # of the demanded amplitude
 SHOWN = 12  # parameters in the picture
-HUNTS, SLOW = "hunting", "missing the bandwidth"
+HUNTS, SLOW = "hunting or undecided", "missing the bandwidth"
 CYCLE, FOLLOWED = "cycle", "followed"
 WORDS = {CYCLE: "the amplitude of the cycle", FOLLOWED: "load over reference"}
 
@@ -57,7 +56,7 @@ class Shot:
 
 
 def hunts(result: Mapping[str, Any]) -> bool:
-    """Whether a step does not come to rest."""
+    """Whether a step does not come to rest: it hunts, or its run is irregular or failed."""
     return any(verdict != "rest" for verdict in result["verdicts"])
 
 
@@ -117,13 +116,7 @@ def robustness_study(  # noqa: PLR0913 - the study, and how it is run
     )
     about = f"{case.name}, {tuned.words if tuned else 'as it is'}, {where.name}"
     pictures = {"influences": _influences(found), "scatter": _scatter(found)}
-    text = [about, *(f"probability of {name}: {in_words(each)}" for name, each in found.probabilities.items())]
-    for measure, rows in found.influences.items():
-        if rows[0].total > 0:
-            listed = ", ".join(f"{row.parameter} {row.total:.2f} +- {row.total_within:.2f}" for row in rows[:3])
-            text.append(f"what {WORDS[measure]} depends on most (share of its variance): {listed}")
-        else:
-            text.append(f"{WORDS[measure]} does not vary")
+    text = sentences(found, about)
     result = {
         "about": about,
         "title": specification.title,
@@ -145,6 +138,18 @@ def robustness_study(  # noqa: PLR0913 - the study, and how it is run
         files={"points.csv": _points_csv(found)},
         page=partial(_html, result, text),
     )
+
+
+def sentences(found: Robustness, about: str) -> list[str]:
+    """What came of it."""
+    text = [about, *(f"probability of {name}: {in_words(each)}" for name, each in found.probabilities.items())]
+    for measure, rows in found.influences.items():
+        if rows[0].total > 0:
+            listed = ", ".join(f"{row.parameter} {row.total:.2f} +- {row.total_within:.2f}" for row in rows[:3])
+            text.append(f"what {WORDS[measure]} depends on most (share of its variance): {listed}")
+        else:
+            text.append(f"{WORDS[measure]} does not vary")
+    return text
 
 
 def in_words(each: Probability) -> str:
@@ -182,7 +187,7 @@ def _scatter(found: Robustness) -> Figure:
     names = names if len(names) == 2 else names * 2  # noqa: PLR2004 - two axes
     figure = Figure(figsize=(6, 4.2), layout="constrained")
     axes = figure.subplots()
-    for label, marks, style in (("rests", False, "o"), ("hunts", True, "x")):
+    for label, marks, style in (("rests", False, "o"), ("hunts or undecided", True, "x")):
         chosen = [p for p, result in zip(found.points, found.results, strict=True) if hunts(result) == marks]
         if chosen:
             axes.plot([p[names[0]] for p in chosen], [p[names[1]] for p in chosen], style, ms=5, label=label)

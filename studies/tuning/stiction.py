@@ -1,18 +1,20 @@
-"""The stiction margin that a design really has, simulated in every corner: in steps upward, then by bisection."""
+"""The stiction margin that a design really has, simulated in every corner: in steps upward, then by bisection.
+
+Hunting may end again where the motor is too weak to break away, so every factor from the lowest on is tried, in steps;
+hunting in a window of factors that is narrower than a step can be missed.
+"""
 
 import math
 from collections.abc import Callable, Mapping, MutableMapping, Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from actuator.actuator import Actuator
+from actuator.hunting.margins import sliding_of
 from actuator.hunting.verdict import REST
 from actuator.response.sweep import sweep
 from studies.kept import fingerprint
 from studies.specification import Corner, Demand
 from studies.tuning.check import Bench, step_trials
-from studies.tuning.corners import BREAKAWAY, sliding_of
 from studies.tuning.plant import defaults_of
 
 MOST = 4.0  # factor on all breakaway friction up to which hunting is looked for
@@ -28,10 +30,10 @@ class StictionMargin(NamedTuple):
     corner : str
         Its name.
     rests : float or None
-        The largest factor up to which all steps come to rest; None where there is hunting although breakaway friction
-        is no more than sliding friction.
+        The largest factor up to which all steps come to rest; None where one does not at the lowest factor, with
+        breakaway friction no more than sliding friction.
     hunts : float or None
-        The smallest at which one does not; None where all come to rest at the factors tried up to MOST.
+        The smallest found at which one does not; None where all come to rest at the factors tried up to MOST.
     """
 
     corner: str
@@ -44,7 +46,7 @@ class StictionMargin(NamedTuple):
         if self.hunts is None:
             return f"none up to factor {MOST:g}"
         if self.rests is None:
-            return "at any factor, without stiction too"
+            return "at the lowest factor too, with breakaway friction no more than sliding friction"
         return f"between factors {self.rests:.3g} and {self.hunts:.3g}"
 
 
@@ -81,19 +83,12 @@ class Seeker:
         return any(self.bench(trial)["verdict"] != REST for trial in reversed(steps.values()))
 
     def __call__(self, search: Search) -> dict[str, Any]:
-        """Factors between which hunting begins, from below; None where it does not on this side.
-
-        Hunting may end again where the motor is too weak to break away, so the first factor is looked for in steps.
-        """
-        lowest, middle = least(self.defaults | search.corner.parameters), max(search.demand.stiction_margin, 1.0)
-        rests = not self.hunts(search, middle)  # as most designs do that meet their demand
-        low, end = (middle, MOST) if rests else (lowest, middle)
-        if not rests and self.hunts(search, low):
+        """Factors between which hunting begins, from below; None where it does not on this side."""
+        low, *others = rungs(least(self.defaults | search.corner.parameters), search.demand.stiction_margin)
+        if self.hunts(search, low):
             return {"rests": None, "hunts": low}
-        steps = math.ceil(math.log(end / low) / math.log(STEP)) if end > low else 0
-        ladder = np.geomspace(low, end, steps + 1)[1:].tolist()
-        for high in ladder:
-            if (high == end and not rests) or self.hunts(search, high):
+        for high in others:
+            if self.hunts(search, high):
                 break
             low = high
         else:
@@ -104,11 +99,17 @@ class Seeker:
         return {"rests": low, "hunts": high}
 
 
+def rungs(lowest: float, demanded: float) -> list[float]:
+    """The factors that are tried, from the lowest to MOST: no further apart than STEP, with 1 and what is demanded."""
+    count = math.ceil(math.log(MOST / lowest) / math.log(STEP))
+    return sorted({MOST, 1.0, demanded} | {lowest * STEP**k for k in range(count)})
+
+
 def least(values: Mapping[str, float]) -> float:
     """The factor on breakaway friction at which none of it exceeds sliding friction."""
     found = [1.0]
     for name, value in values.items():
-        sliding = sliding_of(name, values) if name.endswith(tuple(BREAKAWAY)) else None
+        sliding = sliding_of(name, values)
         if sliding is not None and value > 0:
             found.append(values[sliding] / value)
     return max(min(found), 1e-3)
@@ -129,11 +130,9 @@ def stiction_margins(  # noqa: PLR0913 - what is searched, and how it is run
     Parameters as for `check_corners`.
     """
     searches = {corner.name: Search(corner, dict(design), demand) for corner in corners}
-    model = repr(plant)
+    model, demanded = repr(plant), (demand.sine, demand.stiction_margin)
     keys = {
-        name: fingerprint(
-            ["stiction", model, search.corner.parameters, search.design, demand.sine, MOST, STEP, ACCURACY]
-        )
+        name: fingerprint(["stiction", model, search.corner.parameters, search.design, *demanded, MOST, STEP, ACCURACY])
         for name, search in searches.items()
     }
     points = {keys[name]: search for name, search in searches.items()}

@@ -6,7 +6,7 @@ stiffly as the demands leave room for:
     minimize    ln e over ln gains    subject to    slip D(gains) <= e <= standing error demanded,
                                                     all other demands, in every corner and contact mode
 
-by sequential quadratic programming with the exact derivatives of `tuning_measures`. Few corners and modes decide; the
+by sequential quadratic programming with the exact derivatives of `measures`. Few corners and modes decide; the
 problem is solved with those, held against all, and solved again with the ones it violates until there are none. What
 the simulation of a corner then shows to be short of its demand tightens that demand by as much, and all is done again.
 At last the stiction margin that the design really has is looked for by simulation.
@@ -188,31 +188,28 @@ def tune(  # noqa: PLR0913 - the task, and how it is run
         shares = lambda n, of: tell(what, n / of)  # noqa: E731 - one line
         return work(plant, corners, parameters, demand, done=done, workers=workers, progress=shares)
 
+    def designed(k: int, tightening: Mapping[str, float], first: Mapping[str, float] | None) -> Design:
+        tell(f"optimization {k}", 0.0)
+        found = design(distinct, start, specification, tightening, first)
+        return replace(
+            found, measures=tuple(m._replace(corner=name) for m in found.measures for name in twins[m.corner])
+        )
+
+    def checked(found: Design) -> list[CornerCheck]:
+        return simulated("tuned", check_corners, with_dead_band(original, found.gains, found.standing_error))
+
     before_checks = simulated("as it is", check_corners, before)
     twins = twins_of(before_measures)
     distinct = [modes for modes in everywhere if modes.corner.name in twins]
-    tightening: dict[str, float] = {}
-    rounds: list[Round] = []
-    for k in range(ROUNDS):
-        tell(f"optimization {k + 1}", 0.0)
-        found = design(distinct, rounds[-1].design.gains if rounds else start, specification, tightening)
-        found = replace(
-            found, measures=tuple(m._replace(corner=name) for m in found.measures for name in twins[m.corner])
-        )
-        parameters = with_dead_band(original, found.gains, found.standing_error)
-        checks = simulated("tuned", check_corners, parameters)
-        rounds.append(Round(dict(tightening), found, checks))
-        asked = shortfalls(checks, demand)
-        if not asked:
-            break
-        for name, factor in asked.items():
-            tightening[name] = tightening.get(name, 1.0) * factor
-    else:
-        factors = ", ".join(f"{name} by a factor of {factor:.3g}" for name, factor in asked.items())
-        raise NotTunable(f"after {ROUNDS} rounds the simulations still miss what is demanded: {factors}")
+    rounds = _rounds(designed, checked, demand)
+    last = rounds[-1].design
     margins_before = simulated("margin as it is", stiction_margins, before)
-    margins_found = simulated("margin tuned", stiction_margins, parameters)
-    curve = trade_off(linear, distinct, rounds[-1], specification, margins, lambda share: tell("trade-off", share))
+    margins_found = simulated(
+        "margin tuned", stiction_margins, with_dead_band(original, last.gains, last.standing_error)
+    )
+    curve = trade_off(
+        linear, distinct, start, rounds[-1], specification, margins, lambda share: tell("trade-off", share)
+    )
     return Tuned(
         specification=specification,
         original=original,
@@ -227,6 +224,30 @@ def tune(  # noqa: PLR0913 - the task, and how it is run
         margins=margins_found,
         trade_off=curve,
     )
+
+
+def _rounds(
+    designed: Callable[[int, Mapping[str, float], Mapping[str, float] | None], Design],
+    checked: Callable[[Design], list[CornerCheck]],
+    demand: Demand,
+) -> list[Round]:
+    """Designs, each with its demands tightened by what the simulations of the one before have missed, until none is.
+
+    `designed` is from the number of the round, the tightening and the gains of the last one.
+    """
+    tightening: dict[str, float] = {}
+    rounds: list[Round] = []
+    for k in range(ROUNDS):
+        found = designed(k + 1, tightening, rounds[-1].design.gains if rounds else None)
+        checks = checked(found)
+        rounds.append(Round(dict(tightening), found, checks))
+        asked = shortfalls(checks, demand)
+        if not asked:
+            return rounds
+        for name, factor in asked.items():
+            tightening[name] = tightening.get(name, 1.0) * factor
+    factors = ", ".join(f"{name} by a factor of {factor:.3g}" for name, factor in asked.items())
+    raise NotTunable(f"after {ROUNDS} rounds the simulations still miss what is demanded: {factors}")
 
 
 def require_tunable(specification: Specification, plant: Actuator) -> None:
@@ -266,6 +287,7 @@ def twins_of(found: Sequence[Measure]) -> dict[str, list[str]]:
 def trade_off(  # noqa: PLR0913, PLR0917 - a design, and along what it is varied
     linear: Actuator,
     everywhere: Sequence[CornerModes],
+    start: Mapping[str, float],
     last: Round,
     specification: Specification,
     margins: Sequence[float],
@@ -282,6 +304,6 @@ def trade_off(  # noqa: PLR0913, PLR0917 - a design, and along what it is varied
             for modes in everywhere
             if modes.corner.name in deciding
         ]
-        found = design(corners, last.design.gains, relaxed, last.tightening)
+        found = design(corners, start, relaxed, last.tightening, last.design.gains)
         curve.append((margin, found.standing_error))
     return tuple(curve)

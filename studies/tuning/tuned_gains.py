@@ -31,10 +31,12 @@ def tuned_gains(path: Path, plant: Actuator) -> TunedGains:
         Where the file is no result of a tuning, or the actuator has no such parameter.
     """
     try:
-        result = json.loads(path.read_text(encoding="utf-8"))
+        result = json.loads(path.read_bytes())
         values = {name: float(value) for name, value in result["gains"]["tuned"].items()}
         found = TunedGains(values, str(result["case"]), path)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    except OSError as error:
+        raise CaseError(f"{path}: cannot be read: {error.strerror}") from None
+    except (ValueError, KeyError, TypeError, AttributeError):
         raise CaseError(f"{path}: is no result.json of a tuning") from None
     known = defaults_of(plant.system().parameters)
     for name in found.values:

@@ -1,13 +1,13 @@
 """One actuator: its parts, their composition, and every question that can be asked of it."""
 
 from actuator.actuator import Actuator as Actuator
-from actuator.hunting.boundary import Bisection as Bisection
+from actuator.hunting.bisection import Bisection as Bisection
+from actuator.hunting.bisection import bisect_by_simulation as bisect_by_simulation
 from actuator.hunting.boundary import Boundary as Boundary
 from actuator.hunting.boundary import Stretch as Stretch
-from actuator.hunting.boundary import bisect_by_simulation as bisect_by_simulation
 from actuator.hunting.boundary import hunting_boundary as hunting_boundary
+from actuator.hunting.branch import Branch as Branch
 from actuator.hunting.causes import find_causes as find_causes
-from actuator.hunting.continuation import Branch as Branch
 from actuator.hunting.continuation import follow as follow
 from actuator.hunting.cycle_energy import energy_per_cycle as energy_per_cycle
 from actuator.hunting.decide import decide as decide
@@ -27,9 +27,9 @@ from actuator.hunting.orbit import Orbit as Orbit
 from actuator.hunting.remedies import find_remedies as find_remedies
 from actuator.hunting.rest import NotAtRest as NotAtRest
 from actuator.hunting.rest import Rest as Rest
-from actuator.hunting.rest import RestSet as RestSet
 from actuator.hunting.rest import rest as rest
-from actuator.hunting.rest import rest_set as rest_set
+from actuator.hunting.rest_set import RestSet as RestSet
+from actuator.hunting.rest_set import rest_set as rest_set
 from actuator.hunting.verdict import Hunting as Hunting
 from actuator.hunting.verdict import classify as classify
 from actuator.hybrid import HybridSystem as HybridSystem
@@ -113,9 +113,9 @@ from actuator.response.stiffness import DynamicStiffness as DynamicStiffness
 from actuator.response.stiffness import dynamic_stiffness as dynamic_stiffness
 from actuator.response.stiffness import locked as locked
 from actuator.response.stiffness import unpowered as unpowered
-from actuator.simulation.engine import Chattering as Chattering
-from actuator.simulation.engine import InconsistentModes as InconsistentModes
-from actuator.simulation.engine import SimulationError as SimulationError
+from actuator.simulation.failures import Chattering as Chattering
+from actuator.simulation.failures import InconsistentModes as InconsistentModes
+from actuator.simulation.failures import SimulationError as SimulationError
 from actuator.simulation.run import ModeChange as ModeChange
 from actuator.simulation.run import Run as Run
 from actuator.simulation.signals import Chirp as Chirp

@@ -77,7 +77,7 @@ def reversed_since(remembered: Scalar, error: Scalar) -> Scalar:
     return (remembered * error < 0) * 1.0
 
 
-# -- the integral of a law, which is a PI or a PID --------------------------------------------------------
+# -- the integral of a law, which is a PI or a PID: their methods -----------------------------------------
 
 
 def check_anti_windup(law: Any) -> None:
@@ -90,7 +90,7 @@ def check_anti_windup(law: Any) -> None:
         )
 
 
-def memory_of(law: Any, unit: str, nominal: float) -> tuple[Memory, ...]:
+def memory_of(law: Any, unit: str = "output", nominal: float = 1.0) -> tuple[Memory, ...]:
     """The integral state, and the last error where the integral is reset on reversal."""
     integral = Memory("integral", unit, nominal)
     reset = law.remedies is not None and law.remedies.reset_on_reversal
@@ -112,7 +112,13 @@ def _rate(law: Any, state: Scalar, error: Scalar, proposed: Scalar, realized: Sc
 
 
 def rate_of(law: Any, state: Scalar, error: Scalar, proposed: Scalar, realized: Scalar) -> Scalar:
-    """Time derivative of the integral state, continuous form."""
+    """Time derivative of the integral state, continuous form.
+
+    Raises
+    ------
+    ValueError
+        Where the integral is reset on reversal, which needs a sampled controller.
+    """
     if law.remedies is not None and law.remedies.reset_on_reversal:
         raise ValueError(
             f"{type(law).__name__}: reset_on_reversal needs a sampled controller: give it a sampling, "
@@ -128,9 +134,12 @@ def advanced(  # noqa: PLR0913 - the law, what it saw, and its period
     proposed: Scalar,
     realized: Scalar,
     period: Scalar,
-    remembered: Scalar | None,
+    remembered: Scalar | None = None,
 ) -> Scalar:
-    """The integral state after a sample."""
+    """Integral state after a sample, by Euler's forward rule as in drives.
+
+    `remembered` is the last error that was not zero, needed where the integral is reset on reversal.
+    """
     after = state + period * _rate(law, state, error, proposed, realized)
     if law.remedies is None or not law.remedies.reset_on_reversal:
         return after

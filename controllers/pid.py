@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 from controllers.integral import AntiWindup, IntegralRemedies, advanced, check_anti_windup, memory_of, rate_of
-from controllers.memory import Memory
 from controllers.rules import (
     DerivativeGain,
     IntegralGain,
@@ -96,38 +95,12 @@ class PI:
         """Current control of a winding: its zero cancels R/L, leaving one pole at `bandwidth` [rad/s]."""
         return cls(proportional=bandwidth * inductance, integral=bandwidth * resistance)
 
-    def memory(self, unit: str = "output", nominal: float = 1.0) -> tuple[Memory, ...]:
-        """The integral state, and the last error where the integral is reset on reversal."""
-        return memory_of(self, unit, nominal)
-
     def proposed(self, state: Scalar, error: Scalar, reference: Scalar | None = None) -> Scalar:
         """Output before any limit; `reference` is needed with a set-point weight."""
         return self.proportional * _weighted(self, error, reference) + state
 
-    def rate_of_integral(self, state: Scalar, error: Scalar, proposed: Scalar, realized: Scalar) -> Scalar:
-        """Time derivative of the integral state, continuous form.
-
-        Raises
-        ------
-        ValueError
-            Where the integral is reset on reversal, which needs a sampled controller.
-        """
-        return rate_of(self, state, error, proposed, realized)
-
-    def advance(  # noqa: PLR0913 - what the law saw, and its period
-        self,
-        state: Scalar,
-        error: Scalar,
-        proposed: Scalar,
-        realized: Scalar,
-        period: Scalar,
-        remembered: Scalar | None = None,
-    ) -> Scalar:
-        """Integral state after a sample, by Euler's forward rule as in drives.
-
-        `remembered` is the last error that was not zero, needed where the integral is reset on reversal.
-        """
-        return advanced(self, state, error, proposed, realized, period, remembered)
+    # the integral is that of every law with one
+    memory, rate_of_integral, advance = memory_of, rate_of, advanced
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -186,15 +159,11 @@ class PID:
             filter_time=filter_time,
         )
 
-    def memory(self, unit: str = "output", nominal: float = 1.0) -> tuple[Memory, ...]:
-        """The integral state, and the last error where the integral is reset on reversal.
-
-        The filtered position is the memory of `rate` and `advance_filtered`.
-        """
-        return memory_of(self, unit, nominal)
-
     def rate(self, measured: Scalar, filtered: Scalar, period: Scalar | None = None) -> Scalar:
-        """Filtered derivative of the measurement; only with `filter_time`."""
+        """Filtered derivative of the measurement; only with `filter_time`.
+
+        The filtered position is a memory of its own, beside that of the integral.
+        """
         if self.filter_time is None:
             raise ValueError("PID.rate needs a filter_time [s]; without one the speed is measured")
         if period is None:
@@ -209,30 +178,8 @@ class PID:
         """Output before any limit; `reference` is needed with a set-point weight."""
         return self.proportional * _weighted(self, error, reference) + state - self.derivative * rate
 
-    def rate_of_integral(self, state: Scalar, error: Scalar, proposed: Scalar, realized: Scalar) -> Scalar:
-        """Time derivative of the integral state, continuous form.
-
-        Raises
-        ------
-        ValueError
-            Where the integral is reset on reversal, which needs a sampled controller.
-        """
-        return rate_of(self, state, error, proposed, realized)
-
-    def advance(  # noqa: PLR0913 - what the law saw, and its period
-        self,
-        state: Scalar,
-        error: Scalar,
-        proposed: Scalar,
-        realized: Scalar,
-        period: Scalar,
-        remembered: Scalar | None = None,
-    ) -> Scalar:
-        """Integral state after a sample, by Euler's forward rule as in drives.
-
-        `remembered` is the last error that was not zero, needed where the integral is reset on reversal.
-        """
-        return advanced(self, state, error, proposed, realized, period, remembered)
+    # the integral is that of every law with one
+    memory, rate_of_integral, advance = memory_of, rate_of, advanced
 
 
 def _weighted(law: PI | PID, error: Scalar, reference: Scalar | None) -> Scalar:

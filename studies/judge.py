@@ -27,10 +27,11 @@ from actuator import (
     without_counts,
 )
 from actuator.hunting.causes import Causes, find_causes
+from actuator.hunting.find_sampled_orbit import find_sampled_orbit
 from actuator.hunting.flow_map import flow_map
 from actuator.hunting.margins import ENDINGS, HuntingMargin, hunting_margin
 from actuator.hunting.remedies import Remedy, RemedySearch, RemedyTable
-from actuator.hunting.sampled_orbit import SampledOrbit, find_sampled_orbit
+from actuator.hunting.sampled_orbit import SampledOrbit
 from actuator.hunting.verdict import DIVERGING
 from actuator.ledger import PREFIX
 from actuator.response.processes import processes
@@ -218,7 +219,7 @@ class _Inside:
             raise NoOrbit(
                 f"a period has {ticks:.0f} ticks of the controller, and closing it exactly takes derivatives through "
                 f"all of them many times: hours; beyond {MOST_TICKS} it is not tried. Period and amplitude are those "
-                "of the run; actuator.hunting.sampled_orbit.find_sampled_orbit tries it"
+                "of the run; actuator.find_orbit tries it"
             )
 
     def margins(self) -> dict[str, HuntingMargin]:

@@ -30,7 +30,8 @@ from actuator import (
 from actuator.hybrid import Quantity
 from actuator.parameters import Parameter
 from actuator.simulation.compiled import compiler
-from actuator.simulation.engine import EngineOptions, engine
+from actuator.simulation.engine import engine
+from actuator.simulation.prepared import EngineOptions
 from controllers import PID
 from gear import Bearing, Shaft, Transmission
 

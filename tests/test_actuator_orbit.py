@@ -13,6 +13,7 @@ from mass_on_guide import MassOnGuide
 
 from actuator import NoOrbit, find_orbit, follow, simulate
 from actuator.hunting.flow_map import flow_map
+from actuator.hunting.passage import passage
 from actuator.hunting.sampled_orbit import SampledOrbit
 from controllers import Sampling
 
@@ -108,12 +109,12 @@ def test_derivatives_of_the_return_map_by_parameters_are_those_of_difference_quo
     names = [parameter.name for parameter in orbit.system.parameters]
     column = np.zeros((len(names), 1))
     column[names.index("controller.integral")] = 1
-    passage = orbit.map.passage(orbit.x0, orbit.segments, orbit.u, orbit.p, np.zeros((orbit.x0.size, 1)), column)
+    through = passage(orbit.map, orbit.x0, orbit.segments, orbit.u, orbit.p, np.zeros((orbit.x0.size, 1)), column)
     ends = []
     for step in (1e-4, -1e-4):
-        ends.append(orbit.map.passage(orbit.x0, orbit.segments, orbit.u, orbit.p + step * column.ravel()))
-    assert (ends[0].duration - ends[1].duration) / 2e-4 == pytest.approx(passage.delayed[0], rel=1e-6)
-    np.testing.assert_allclose((ends[0].end - ends[1].end) / 2e-4, passage.moved[:, 0], rtol=1e-6, atol=1e-8)
+        ends.append(passage(orbit.map, orbit.x0, orbit.segments, orbit.u, orbit.p + step * column.ravel()))
+    assert (ends[0].duration - ends[1].duration) / 2e-4 == pytest.approx(through.delayed[0], rel=1e-6)
+    np.testing.assert_allclose((ends[0].end - ends[1].end) / 2e-4, through.moved[:, 0], rtol=1e-6, atol=1e-8)
 
 
 def test_without_extra_breakaway_friction_there_is_no_orbit():

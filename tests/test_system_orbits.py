@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from actuator import classify, find_orbit, rest, rest_set, simulate
+from actuator.hunting.passage import passage
 from studies import load_case
 
 DURATION = 20.0  # s
@@ -42,13 +43,13 @@ def return_map(orbit, step):
     The state is moved only in directions that its stuck contacts allow, which are those in which it returns.
     """
     scale, m = orbit.map.nominal, orbit.map
-    whole = m.passage(orbit.x0, orbit.segments, orbit.u, orbit.p, np.eye(scale.size)).moved
+    whole = passage(m, orbit.x0, orbit.segments, orbit.u, orbit.p, np.eye(scale.size)).moved
     left, size, _ = np.linalg.svd(whole * scale / scale[:, None])
     allowed = left[:, size > 1e-9 * size[0]]
     matrix = np.zeros((allowed.shape[1], allowed.shape[1]))
     for column, direction in enumerate(allowed.T):
         ends = [
-            m.passage(orbit.x0 + k * step * direction * scale, orbit.segments, orbit.u, orbit.p).end
+            passage(m, orbit.x0 + k * step * direction * scale, orbit.segments, orbit.u, orbit.p).end
             for k in (-2, -1, 1, 2)
         ]
         change = (ends[0] - 8 * ends[1] + 8 * ends[2] - ends[3]) / 12

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from actuator.hunting.flow_map import FlowMap, Segment
+from actuator.hunting.flow_map import FlowMap
+from actuator.hunting.passage import Segment
 from actuator.hybrid import HybridSystem
 from actuator.simulation.run import FREE, STUCK, contact_labels
 

@@ -14,7 +14,7 @@ from actuator.simulation.plots import DEGREES, LEGEND_ABOVE, MODE_COLORS, RIBBON
 from actuator.simulation.run import contact_labels
 
 if TYPE_CHECKING:
-    from actuator.hunting.continuation import Branch
+    from actuator.hunting.branch import Branch
 
 
 def plot_orbit(orbit: Orbit, names: Sequence[str]) -> Figure:

@@ -18,7 +18,8 @@ import numpy as np
 
 from actuator.actuator import Actuator
 from actuator.hunting.cycle_energy import changed_parameters
-from actuator.hunting.rest import NotAtRest, RestSet, rest_set
+from actuator.hunting.rest import NotAtRest
+from actuator.hunting.rest_set import RestSet, rest_set
 from actuator.hunting.verdict import classify
 from actuator.parts.sensors import Sensors
 from actuator.simulation.run import FREE, STUCK, Run

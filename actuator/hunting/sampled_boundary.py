@@ -5,14 +5,13 @@ from one to the next the cycle is the same but for less than a tick. It is follo
 few simulated cycles closed by Newton's method, until none closes.
 """
 
-from dataclasses import dataclass, field
-
 import numpy as np
 
 from actuator.actuator import Actuator
-from actuator.hunting.continuation import BOUND, LOST, End
+from actuator.hunting.branch import BOUND, LOST, Branch, End
+from actuator.hunting.find_sampled_orbit import close_sampled, find_sampled_orbit, resting_point
 from actuator.hunting.flow_map import NoOrbit
-from actuator.hunting.sampled_orbit import SampledOrbit, close_sampled, continued, find_sampled_orbit, resting_point
+from actuator.hunting.sampled_orbit import SampledOrbit, continued
 from actuator.hybrid import HybridSystem
 from actuator.parameters import require_known
 from actuator.simulation.run import Run
@@ -20,28 +19,6 @@ from actuator.simulation.run import Run
 FIRST, LARGEST, SMALLEST = 0.05, 0.2, 1e-3  # steps over the width of the bounds
 GROWS = 1.5
 CYCLES = 15  # from the last orbit to a new one: near its end a cycle settles slowly
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class SampledBranch:
-    """A family of orbits of a sampled system over one parameter.
-
-    Attributes
-    ----------
-    parameter : str
-        Its name.
-    values : ndarray, (n,)
-        Of the parameter.
-    orbits : tuple of SampledOrbit
-        In the order of the family.
-    end : End
-        Where and how it ends; a fold is not told from other ends ("lost"), as only one side of it is followed.
-    """
-
-    parameter: str
-    values: np.ndarray
-    orbits: tuple[SampledOrbit, ...] = field(repr=False)
-    end: End
 
 
 def follow_sampled(
@@ -52,7 +29,7 @@ def follow_sampled(
     *,
     upward: bool = True,
     compiled: bool | None = None,
-) -> SampledBranch:
+) -> Branch:
     """Follow the cycle that a run ends in over a parameter, from its value in the run to where the cycle ends.
 
     Parameters
@@ -70,6 +47,11 @@ def follow_sampled(
     compiled : bool or None
         As for `simulate`.
 
+    Returns
+    -------
+    Branch
+        Of SampledOrbit. A fold is not told from other ends ("lost"), as only one side of it is followed.
+
     Raises
     ------
     NoOrbit
@@ -86,7 +68,7 @@ def follow_sampled(
         value = min(max(values[-1] + sign * step, bounds[0]), bounds[1])
         if value == values[-1]:
             end = End(BOUND, value, f"the cycle exists up to {parameter} = {value:g}")
-            return SampledBranch(parameter=parameter, values=np.array(values), orbits=tuple(orbits), end=end)
+            return Branch(parameter=parameter, values=np.array(values), orbits=tuple(orbits), end=end)
         try:
             orbit = _next(orbits[-1], index, value, compiled)
         except NoOrbit as error:
@@ -96,9 +78,7 @@ def follow_sampled(
         values.append(value)
         step = min(GROWS * step, LARGEST * width)
     reason = f"no orbit closes {step:.3g} beyond {parameter} = {values[-1]:.6g}: {failure}"
-    return SampledBranch(
-        parameter=parameter, values=np.array(values), orbits=tuple(orbits), end=End(LOST, values[-1], reason)
-    )
+    return Branch(parameter=parameter, values=np.array(values), orbits=tuple(orbits), end=End(LOST, values[-1], reason))
 
 
 def _next(last: SampledOrbit, index: int, value: float, compiled: bool | None) -> SampledOrbit:

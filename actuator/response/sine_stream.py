@@ -14,8 +14,11 @@ from actuator.hybrid import HybridSystem
 from actuator.parameters import require_known
 from actuator.response.fourier import fourier
 from actuator.response.standstill import find_rest, middle, slowest_constant, soaked
-from actuator.simulation.engine import Engine, EngineOptions, SimulationError, engine, join
+from actuator.simulation.engine import Engine, engine
+from actuator.simulation.failures import SimulationError
+from actuator.simulation.prepared import EngineOptions
 from actuator.simulation.signals import Constant, Signal, Sine, piece_at
+from actuator.simulation.window_points import join
 
 POINTS = 200  # output points of a period, at least
 STILL = 1e-9  # peak to peak, in the unit of the output, below which nothing moves

@@ -73,6 +73,20 @@ def compile_function(function: ca.Function) -> ca.Function | None:
     return ca.external(function.name(), str(library))
 
 
+def compiled_where_wanted(function: ca.Function, wanted: bool | None) -> ca.Function | None:
+    """The function compiled, or None: False wants none, True insists, None takes what can be had.
+
+    Raises
+    ------
+    RuntimeError
+        Where it is insisted on and there is no C compiler, or one fails.
+    """
+    loaded = None if wanted is False else compile_function(function)
+    if loaded is None and wanted:
+        raise RuntimeError("compiled=True needs a C compiler (cc, gcc or $CC); none was found")
+    return loaded
+
+
 @cache
 def _say_once(message: str) -> None:
     log.warning(message)

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-    from actuator.simulation.engine import Window
     from actuator.simulation.signals import Signal
+    from actuator.simulation.window_points import Window
 
 STUCK, FORWARD, BACKWARD, FREE = "stuck", "forward", "backward", "free"
 LABELS = {0: STUCK, 1: FORWARD, -1: BACKWARD, 2: STUCK, -2: STUCK}  # +-2: stuck at its limit, held by others

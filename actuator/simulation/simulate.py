@@ -11,10 +11,12 @@ from actuator.actuator import Actuator
 from actuator.fitting import require_within_stops
 from actuator.hybrid import HybridSystem
 from actuator.parameters import require_known, with_values
-from actuator.simulation.engine import EngineOptions, Window, engine, join
+from actuator.simulation.engine import engine
+from actuator.simulation.prepared import EngineOptions
 from actuator.simulation.run import Run, Statistics
 from actuator.simulation.signals import Constant, Signal, bounds, break_points, piece_at
 from actuator.simulation.window import INTERVALS
+from actuator.simulation.window_points import Window, join
 
 DEFAULT_POINTS = 2000
 ALMOST = 1 - 1e-12  # a ratio that is whole but for rounding

@@ -14,7 +14,7 @@ from actuator.hunting.verdict import REST, Hunting, classify
 from actuator.response.sine_stream import SinePoint, SineStream
 from actuator.response.standstill import rest_of
 from actuator.response.sweep import sweep
-from actuator.simulation.engine import SimulationError
+from actuator.simulation.failures import SimulationError
 from actuator.simulation.run import Run
 from actuator.simulation.signals import Step
 from actuator.simulation.simulate import simulate

@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from actuator.linear.operating_point import NoEquilibrium
-from actuator.simulation.engine import SimulationError
+from actuator.simulation.failures import SimulationError
 from studies.commands import JOBS, RESUMES, announce, begun, out_option, refusing
 from studies.files import CaseError
 from studies.findings import PAGE, Findings

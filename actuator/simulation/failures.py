@@ -1,0 +1,50 @@
+"""What a run that cannot be completed raises: where it stood, and in which modes."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from actuator.hybrid import HybridSystem
+
+
+class SimulationError(RuntimeError):
+    """A run that could not be completed; `time` [s] and `modes` say where it stood."""
+
+    def __init__(self, message: str, time: float, modes: dict[str, int]) -> None:
+        super().__init__(message)
+        self.time = time
+        self.modes = modes
+
+
+class Chattering(SimulationError):
+    """More events than any mechanism has: the modes change back and forth without time passing."""
+
+
+class InconsistentModes(SimulationError):
+    """No combination of modes satisfies all contacts at once."""
+
+
+def stopped(system: HybridSystem, time: float, modes: Sequence[float] | np.ndarray, reason: str) -> SimulationError:
+    """The integrator gave up at a time, for a reason in its own words."""
+    named = {name: int(mode) for name, mode in zip(system.modes, modes, strict=True)}
+    kind = Chattering if "max_events" in reason else SimulationError
+    return kind(
+        f"{system.name}: the run cannot go on after t = {time:.9g} s ({reason}); the modes there are {_told(named)}",
+        time,
+        named,
+    )
+
+
+def inconsistent(system: HybridSystem, time: float, modes: Sequence[float] | np.ndarray) -> InconsistentModes:
+    """The decision of the modes failed at a time; `modes` are those it tried last."""
+    named = {name: int(mode) for name, mode in zip(system.modes, modes, strict=True)}
+    return InconsistentModes(
+        f"{system.name}: no combination of contact modes is consistent at t = {time:.9g} s; the last tried is "
+        f"{_told(named)}. Does friction jam the train?",
+        time,
+        named,
+    )
+
+
+def _told(modes: dict[str, int]) -> str:
+    return ", ".join(f"{name} = {mode}" for name, mode in modes.items())

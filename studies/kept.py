@@ -10,7 +10,7 @@ import json
 import os
 import tempfile
 import threading
-from collections.abc import Iterable, Iterator, Mapping, MutableMapping
+from collections.abc import Iterable, Iterator, MutableMapping
 from functools import cache
 from importlib import metadata, resources
 from pathlib import Path
@@ -108,11 +108,6 @@ def fingerprint(what: Any) -> str:
     """Of numbers and words: the same for the same, in every process."""
     text = json.dumps(what, sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
-
-
-def model_of(parameters: Mapping[str, float], words: str = "") -> str:
-    """Of a model, by all its numbers."""
-    return fingerprint([words, dict(parameters)])
 
 
 def actuator_of(actuator: "Actuator", *others: Any) -> str:

@@ -2,17 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import NamedTuple
 
-import casadi as ca
 import numpy as np
 from scipy.linalg import expm, expm_frechet
 
-from actuator.hybrid import HybridSystem
+from actuator.linear.gain_slopes import flow_slopes, places, point_moves
 from actuator.linear.jacobians import require_smooth
 from actuator.linear.operating_point import OperatingPoint
-from actuator.parameters import require_known
 
 
 class Value(NamedTuple):
@@ -154,76 +152,17 @@ def gain_model(
     Raises
     ------
     ValueError
-        For a sampled controller: its model in discrete time has no such derivatives; and for sensors that count.
+        For a sampled controller, which `sampled_gain_model` takes, and for sensors that count.
     """
     system = point.system
     if system.clocks:
         raise ValueError(
-            f"{system.name}: gain_model takes controllers in continuous time: design with sampling = None, and check "
-            "the sampled actuator by simulation"
+            f"{system.name}: gain_model takes controllers in continuous time; sampled_gain_model is for the others"
         )
     require_smooth(system)
-    names = [parameter.name for parameter in system.parameters]
-    rows = [*(quantity.name for quantity in system.outputs), *(quantity.name for quantity in system.states)]
-    columns = [quantity.name for quantity in system.inputs]
-    for wanted, valid, what in ((gains, names, "parameter"), (inputs, columns, "input"), (outputs, rows, "output")):
-        require_known(wanted, valid, what)
-    where = tuple(names.index(name) for name in gains)
-    picked = tuple(rows.index(name) for name in outputs), tuple(columns.index(name) for name in inputs)
-    moves = _moves(resting or point, where)
-    n, i, k = len(point.x), len(outputs), len(inputs)
-    arguments = point.x, point.m, point.u, point.p
-    flat, slopes = _with_slopes(system, where, *picked)(*arguments, moves)
-    sizes = (n, n), (n, k), (i, n), (i, k)
-    ends = np.cumsum([first * second for first, second in sizes])[:-1]
+    where, picked = places(system, gains, inputs, outputs)
     scale = np.array([quantity.nominal for quantity in system.states])
-    nominal = (scale[None, :] / scale[:, None], 1 / scale[:, None], scale[None, :], 1.0)
-    values = [
-        part.reshape(size, order="F") * factor
-        for part, size, factor in zip(np.split(flat.full().ravel(), ends), sizes, nominal, strict=True)
-    ]
-    changes = tuple(
-        np.array([column.reshape(size, order="F") * factor for column in part.T]).reshape(len(gains), *size)
-        for part, size, factor in zip(np.split(slopes.full(), ends), sizes, nominal, strict=True)
+    (a, b, c, d), slopes = flow_slopes(point, where, picked, point_moves(resting or point, where), scale)
+    return GainModel(
+        gains=tuple(gains), given=tuple(inputs), seen=tuple(outputs), a=a, b=b, c=c, d=d, slopes=tuple(slopes)
     )
-    a, b, c, d = values
-    return GainModel(gains=tuple(gains), given=tuple(inputs), seen=tuple(outputs), a=a, b=b, c=c, d=d, slopes=changes)
-
-
-def _moves(point: OperatingPoint, where: tuple[int, ...]) -> np.ndarray:
-    """dx0/dp of the operating point, (states, gains), of least norm in nominal sizes: F_x dx0 + F_p = 0."""
-    of_state, of_gains = (part.full() for part in _of_rates(point.system, where)(point.x, point.m, point.u, point.p))
-    scale = np.array([quantity.nominal for quantity in point.system.states])
-    matrix = of_state / scale[:, None] * scale
-    rows = (
-        1 / np.maximum(np.linalg.norm(matrix, axis=1), 1e-12)[:, None]
-    )  # as `trim`: stiff rows would drown the others
-    return scale[:, None] * np.linalg.lstsq(rows * matrix, -rows * of_gains / scale[:, None], rcond=1e-13)[0]
-
-
-def _symbols(system: HybridSystem) -> list[ca.SX]:
-    return [ca.SX.sym(name, system.flow.size1_in(i)) for i, name in enumerate(("x", "m", "u", "p"))]
-
-
-@lru_cache(maxsize=32)
-def _of_rates(system: HybridSystem, where: tuple[int, ...]) -> ca.Function:
-    x, m, u, p = _symbols(system)
-    rate = system.flow(x, m, u, p)
-    return ca.Function("rates", [x, m, u, p], [ca.jacobian(rate, x), ca.jacobian(rate, p[list(where)])])
-
-
-@lru_cache(maxsize=32)
-def _with_slopes(
-    system: HybridSystem, where: tuple[int, ...], rows: tuple[int, ...], columns: tuple[int, ...]
-) -> ca.Function:
-    """(x, m, u, p, dx0/dp) -> A, B, C, D in one column, and their derivatives by the gains, a column each."""
-    x, m, u, p = _symbols(system)
-    rate = system.flow(x, m, u, p)
-    seen = ca.vertcat(system.outputs_function(x, m, u, p), x)[list(rows)]
-    used = u[list(columns)]
-    parts = [ca.jacobian(of, by) for of, by in ((rate, x), (rate, used), (seen, x), (seen, used))]
-    flat = ca.vertcat(*(ca.vec(part) for part in parts))
-    moves = ca.SX.sym("moves", x.numel(), len(where))
-    seeds = ca.vertcat(moves, ca.SX(np.eye(p.numel())[:, list(where)]))
-    slopes = ca.jtimes(flat, ca.vertcat(x, p), seeds)
-    return ca.Function("model_with_slopes", [x, m, u, p, moves], [ca.densify(flat), ca.densify(slopes)])

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FREQUENCIES = 2 * np.pi * np.logspace(-2, 4, 1500)  # rad/s
-LOWEST_PHASE, HIGHEST_PHASE = -1.5 * np.pi, 0.5 * np.pi  # in which a loop starts
+HIGHEST_PHASE = 0.5 * np.pi  # at which a loop may start; the lowest is a turn below
 
 
 class Envelope(NamedTuple):

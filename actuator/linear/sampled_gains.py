@@ -13,12 +13,11 @@ from scipy.linalg import expm, expm_frechet
 
 from actuator.hybrid import HybridSystem
 from actuator.ledger import PREFIX
-from actuator.linear.balance import rates_function
+from actuator.linear.gain_slopes import along, flow_slopes, places, point_moves, split, symbols
 from actuator.linear.jacobians import require_smooth
 from actuator.linear.model import ticks_between
 from actuator.linear.operating_point import OperatingPoint
 from actuator.linear.sampled_gain_model import SampledGainModel
-from actuator.parameters import require_known
 
 SAME = 1e-13  # relative change of what flows between ticks that is none
 
@@ -44,17 +43,11 @@ def sampled_gain_model(
     if not system.clocks:
         raise ValueError(f"{system.name}: sampled_gain_model takes sampled controllers; gain_model is for the others")
     require_smooth(system)
-    names = [parameter.name for parameter in system.parameters]
-    rows = [*(quantity.name for quantity in system.outputs), *(quantity.name for quantity in system.states)]
-    columns = [quantity.name for quantity in system.inputs]
-    for wanted, valid, what in ((gains, names, "parameter"), (inputs, columns, "input"), (outputs, rows, "output")):
-        require_known(wanted, valid, what)
-    where = tuple(names.index(name) for name in gains)
-    picked = tuple(rows.index(name) for name in outputs), tuple(columns.index(name) for name in inputs)
-    moves, base = _moves(resting or point, where), system.tick_period(point.p)
+    where, picked = places(system, gains, inputs, outputs)
+    moves, base = point_moves(resting or point, where), system.tick_period(point.p)
     n, k = len(point.x), len(inputs)
     scale = np.array([quantity.nominal for quantity in system.states])
-    (a, b, c, d), (da, db, dc, dd) = _flow(point, where, picked, moves, scale)
+    (a, b, c, d), (da, db, dc, dd) = flow_slopes(point, where, picked, moves, scale)
 
     # between ticks: [A B; 0 0], whose exponential holds Phi and Gamma
     def flowing(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -111,30 +104,6 @@ def sampled_gain_model(
     )
 
 
-# -- Jacobians and their derivatives, at the point and along the way it moves with the gains ----------------
-
-Picked = tuple[tuple[int, ...], tuple[int, ...]]
-
-
-def _moves(point: OperatingPoint, where: tuple[int, ...]) -> np.ndarray:
-    """dx0/dp of the operating point, (states, gains), of least norm in nominal sizes: F_x dx0 + F_p = 0."""
-    of_state, of_gains = (part.full() for part in _of_rates(point.system, where)(point.x, point.m, point.u, point.p))
-    scale = np.array([quantity.nominal for quantity in point.system.states])
-    matrix = of_state / scale[:, None] * scale
-    rows = 1 / np.maximum(np.linalg.norm(matrix, axis=1), 1e-12)[:, None]  # stiff rows would drown the others
-    return scale[:, None] * np.linalg.lstsq(rows * matrix, -rows * of_gains / scale[:, None], rcond=1e-13)[0]
-
-
-def _flow(
-    point: OperatingPoint, where: tuple[int, ...], picked: Picked, moves: np.ndarray, scale: np.ndarray
-) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """A, B, C, D between ticks, and their derivatives."""
-    flat, slopes = _of_flow(point.system, where, *picked)(point.x, point.m, point.u, point.p, moves)
-    n, r, k = len(scale), *(len(part) for part in picked)
-    nominal = (scale[None, :] / scale[:, None], 1 / scale[:, None], scale[None, :], np.ones((1, 1)))
-    return _split(flat.full(), slopes.full(), ((n, n), (n, k), (r, n), (r, k)), nominal)
-
-
 def _tick(  # noqa: PLR0913, PLR0917 - a point, along what it moves, and which tick
     point: OperatingPoint,
     where: tuple[int, ...],
@@ -148,58 +117,14 @@ def _tick(  # noqa: PLR0913, PLR0917 - a point, along what it moves, and which t
     flat, slopes = _of_tick(point.system, where, columns)(due, point.x, point.m, point.u, point.p, moves)
     n, k = len(scale), len(columns)
     nominal = (scale[None, :] / scale[:, None], 1 / scale[:, None])
-    values, changes = _split(flat.full(), slopes.full(), ((n, n), (n, k)), nominal)
+    values, changes = split(flat.full(), slopes.full(), ((n, n), (n, k)), nominal)
     return values[0], values[1], changes[0], changes[1]
-
-
-def _split(
-    flat: np.ndarray, slopes: np.ndarray, sizes: Sequence[tuple[int, int]], nominal: Sequence[np.ndarray]
-) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Matrices from one column, and their derivatives from a column each."""
-    ends = np.cumsum([first * second for first, second in sizes])[:-1]
-    values, changes = [], []
-    for part, change, size, factor in zip(np.split(flat, ends), np.split(slopes, ends), sizes, nominal, strict=True):
-        values.append(part.reshape(size, order="F") * factor)
-        changes.append(np.array([column.reshape(size, order="F") * factor for column in change.T]))
-    return values, changes
-
-
-def _symbols(system: HybridSystem) -> list[ca.SX]:
-    return [ca.SX.sym(name, system.flow.size1_in(i)) for i, name in enumerate(("x", "m", "u", "p"))]
-
-
-@lru_cache(maxsize=32)
-def _of_rates(system: HybridSystem, where: tuple[int, ...]) -> ca.Function:
-    x, m, u, p = _symbols(system)
-    rate = rates_function(system)(x, m, u, p)
-    return ca.Function("rates", [x, m, u, p], [ca.jacobian(rate, x), ca.jacobian(rate, p[list(where)])])
-
-
-@lru_cache(maxsize=32)
-def _of_flow(
-    system: HybridSystem, where: tuple[int, ...], rows: tuple[int, ...], columns: tuple[int, ...]
-) -> ca.Function:
-    x, m, u, p = _symbols(system)
-    rate = system.flow(x, m, u, p)
-    seen = ca.vertcat(system.outputs_function(x, m, u, p), x)[list(rows)]
-    used = u[list(columns)]
-    return _along([x, m, u, p], [(rate, x), (rate, used), (seen, x), (seen, used)], where)
 
 
 @lru_cache(maxsize=32)
 def _of_tick(system: HybridSystem, where: tuple[int, ...], columns: tuple[int, ...]) -> ca.Function:
     assert system.tick is not None
-    x, m, u, p = _symbols(system)
+    x, m, u, p = symbols(system)
     due = ca.SX.sym("due", len(system.clocks))
     after = system.tick(due, x, m, u, p)
-    return _along([due, x, m, u, p], [(after, x), (after, u[list(columns)])], where)
-
-
-def _along(arguments: list[ca.SX], jacobians: list[tuple[ca.SX, ca.SX]], where: tuple[int, ...]) -> ca.Function:
-    """(arguments, dx0/dp) -> Jacobians in one column, and their derivatives by the gains, a column each."""
-    x, p = arguments[-4], arguments[-1]
-    flat = ca.vertcat(*(ca.vec(ca.jacobian(of, by)) for of, by in jacobians))
-    moves = ca.SX.sym("moves", x.numel(), len(where))
-    seeds = ca.vertcat(moves, ca.SX(np.eye(p.numel())[:, list(where)]))
-    slopes = ca.jtimes(flat, ca.vertcat(x, p), seeds)
-    return ca.Function("with_slopes", [*arguments, moves], [ca.densify(flat), ca.densify(slopes)])
+    return along([due, x, m, u, p], [(after, x), (after, u[list(columns)])], where)

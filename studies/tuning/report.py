@@ -10,7 +10,7 @@ from typing import Any
 
 from studies.cases import Case
 from studies.findings import Findings, rendered, versions
-from studies.kept import model_of
+from studies.kept import actuator_of
 from studies.tuning.check import CornerCheck
 from studies.tuning.measures import Measure, worst
 from studies.tuning.pictures import loops_picture, margins_picture, steps_picture, trade_off_picture
@@ -90,7 +90,7 @@ def result_of(tuned: Tuned, case: Case) -> dict[str, Any]:
     return {
         "case": case.name,
         "title": tuned.specification.title,
-        "model": model_of({name: p["value"] for name, p in parameters.items()}, case.name),
+        "model": actuator_of(tuned.plant),
         "met": tuned.met,
         "demand": asdict(tuned.specification.demand),
         "gains": {"before": tuned.before, "start": tuned.start, "tuned": tuned.parameters},

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from actuator.hunting.margins import sliding_of
-from studies.kept import model_of
+from studies.kept import fingerprint
 from studies.specification import Tolerance, matching
 
 TAILS = 1e-3  # of a normal distribution, on each side, that are left out: three sigma
@@ -177,7 +177,7 @@ def robustness(  # noqa: PLR0913 - the study, and how it is run
     sample, influences_of = _scheme(names, seed)
     rows = factors(sample(base), tolerances)
     sets = [{**nominal, **spread(nominal, tolerances, row.tolist())} for row in rows]
-    keys = [model_of(values, about) for values in sets]
+    keys = [fingerprint([about, values]) for values in sets]
     found = sweep(work, dict(zip(keys, sets, strict=True)), done=done, workers=workers, progress=progress)
     results = [found[key] for key in keys]
     block = len(names) + 2

@@ -16,7 +16,7 @@ from actuator.actuator import Actuator
 from studies.cases import Case
 from studies.files import CaseError
 from studies.findings import Findings, rendered, versions
-from studies.kept import model_of
+from studies.kept import actuator_of
 from studies.specification import Corner, Demand, Specification, matching
 from studies.tuning.check import SINE, STEP, Bench, Trial
 from studies.tuning.plant import dead_banded, defaults_of
@@ -120,7 +120,7 @@ def robustness_study(  # noqa: PLR0913 - the study, and how it is run
     result = {
         "about": about,
         "title": specification.title,
-        "model": model_of(nominal, case.name),
+        "model": actuator_of(plant, nominal),
         "seed": seed,
         "base": base,
         "tolerances": [

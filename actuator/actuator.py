@@ -7,14 +7,6 @@ from typing import Any
 
 import casadi as ca
 
-from actuator.contacts import ContactMechanics
-from actuator.drive import ANGLE, Motion, Site, cascade_drive, loops_of, open_drive, pid_drive
-from actuator.fitting import require_fitting
-from actuator.heat import Heat
-from actuator.hybrid import Clock, HybridSystem
-from actuator.ledger import Ledger
-from actuator.observe import Mechanics, observe
-from actuator.parameters import Parameter, parameterize, with_values
 from actuator.parts.current_source import CurrentSource
 from actuator.parts.dc_link import DCLink
 from actuator.parts.inverter import Inverter
@@ -23,6 +15,14 @@ from actuator.parts.load import Load
 from actuator.parts.motor import PMSM, DCMotor, TorqueSource
 from actuator.parts.sensors import Sensors
 from actuator.parts.thermal import ThermalNetwork
+from actuator.system.builder import Ledger
+from actuator.system.compatibility import require_fitting
+from actuator.system.contacts import ContactMechanics
+from actuator.system.drive import ANGLE, Motion, Site, cascade_drive, loops_of, open_drive, pid_drive
+from actuator.system.heat import Heat
+from actuator.system.hybrid import Clock, HybridSystem
+from actuator.system.outputs import Mechanics, observe
+from actuator.system.parameters import Parameter, parameterize, with_values
 from controllers.cascade import Cascade
 from controllers.pid import PID
 from controllers.sampling import LOOPS, Sampling

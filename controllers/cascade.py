@@ -10,8 +10,9 @@ from controllers.filters import LeadLag, LowPass, Notch, SecondOrderLowPass
 from controllers.observer import DisturbanceObserver, FilteredDerivative, PositionObserver
 from controllers.pid import PI, P
 from controllers.reference import RateAndAccelerationLimit, RateLimit
-from controllers.rules import Speed, check, check_choice
 from controllers.scheduling import ScheduledGain
+from controllers.units import Speed
+from gear.quantities import check, check_choice
 
 Filter = LowPass | SecondOrderLowPass | Notch | LeadLag
 CurrentDemand = Literal["quadrature", "least current"]

@@ -10,19 +10,9 @@ from typing import Literal
 import casadi as ca
 
 from controllers.memory import Memory
-from controllers.rules import (
-    ErrorBand,
-    ErrorWidth,
-    Frequency,
-    Level,
-    Limit,
-    Scalar,
-    Speed,
-    Time,
-    check,
-    check_choice,
-)
 from controllers.shapes import direction
+from controllers.units import ErrorBand, ErrorWidth, Frequency, Level, Limit, Speed, Time
+from gear.quantities import Scalar, check, check_choice
 
 Shape = Literal["sine", "square"]
 SHAPES: tuple[Shape, ...] = ("sine", "square")

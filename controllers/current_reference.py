@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from controllers.rules import FluxLinkage, Inductance, Scalar, check
 from controllers.shapes import limited
+from controllers.units import FluxLinkage, Inductance
+from gear.quantities import Scalar, check
 
 TINY = 1e-12  # of the normalized torque: its square is below rounding, its inverse is finite
 FAR_INSIDE = 100.0  # flux limits beyond this times the largest flux do not limit, and stay finite at standstill

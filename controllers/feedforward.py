@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass
 
-from controllers.rules import OptionalInertia, Scalar, Share, Speed, SpeedBand, Torque, ViscousFriction, check
 from controllers.shapes import direction
+from controllers.units import OptionalInertia, Share, Speed, SpeedBand, Torque, ViscousFriction
+from gear.quantities import Scalar, check
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -19,7 +19,8 @@ from dataclasses import dataclass
 import casadi as ca
 
 from controllers.memory import Memory
-from controllers.rules import DampingRatio, Frequency, Scalar, ShareBelowOne, check, is_number
+from controllers.units import DampingRatio, Frequency, ShareBelowOne
+from gear.quantities import Scalar, check, is_number
 
 
 def half_step(frequency: Scalar, period: Scalar) -> Scalar:

@@ -16,8 +16,9 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from controllers.memory import Memory
-from controllers.rules import ErrorBand, Rate, Scalar, check, check_choice
 from controllers.shapes import dead_zone
+from controllers.units import ErrorBand, Rate
+from gear.quantities import Scalar, check, check_choice
 
 AntiWindup = Literal["back-calculation", "clamping", "conditional"]
 ANTI_WINDUP: tuple[AntiWindup, ...] = ("back-calculation", "clamping", "conditional")

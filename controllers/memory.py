@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple, Protocol
 
-from controllers.rules import Scalar
+from gear.quantities import Scalar
 
 
 class Memory(NamedTuple):

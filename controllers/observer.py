@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import casadi as ca
 
 from controllers.memory import Memory
-from controllers.rules import Frequency, Inertia, Scalar, Time, check
 from controllers.shapes import closing_rate
+from controllers.units import Frequency, Inertia, Time
+from gear.quantities import Scalar, check
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,18 +3,9 @@
 from dataclasses import dataclass
 
 from controllers.integral import AntiWindup, IntegralRemedies, advanced, check_anti_windup, memory_of, rate_of
-from controllers.rules import (
-    DerivativeGain,
-    IntegralGain,
-    Limit,
-    PositiveGain,
-    Rate,
-    Scalar,
-    Share,
-    Time,
-    check,
-)
 from controllers.shapes import closing_rate
+from controllers.units import DerivativeGain, IntegralGain, Limit, PositiveGain, Rate, Share, Time
+from gear.quantities import Scalar, check
 
 
 @dataclass(frozen=True, kw_only=True)

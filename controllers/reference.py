@@ -6,8 +6,9 @@ from typing import NamedTuple
 import casadi as ca
 
 from controllers.memory import Memory
-from controllers.rules import Scalar, SignalAcceleration, SignalRate, Time, check
 from controllers.shapes import limited
+from controllers.units import SignalAcceleration, SignalRate, Time
+from gear.quantities import Scalar, check
 
 TINY = 1e-300  # keeps a division finite whose result is multiplied by zero
 

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from controllers.rules import Time, check
+from controllers.units import Time
+from gear.quantities import check
 
 Loop = Literal["current", "speed", "position"]
 LOOPS: tuple[Loop, ...] = ("current", "speed", "position")  # from the inside out

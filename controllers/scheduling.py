@@ -6,7 +6,7 @@ from typing import Any
 
 import casadi as ca
 
-from controllers.rules import Scalar, is_number
+from gear.quantities import Scalar, is_number
 
 GAINS = ("gain", "proportional", "integral", "derivative")
 

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from controllers.rules import Scalar
+from gear.quantities import Scalar
 
 
 def limited(value: Scalar, limit: Scalar | None) -> Scalar:

@@ -13,7 +13,8 @@ from studies.checks.commands import benchmark, cross_check, gear_paper
 from studies.commands import FOLDER, RESUMES
 from studies.frequency.commands import frequency_response
 from studies.hunting.commands import hunting
-from studies.tuning.commands import robustness, tuning
+from studies.robustness.commands import robustness
+from studies.tuning.commands import tuning
 
 DEFAULT_CASE = "aileron"
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from actuator import SimulationError
-from actuator.hunting.margins import MOST
+from actuator.stiction.margins import MOST
 from studies.cases import load_case
 from studies.commands import FOLDER, RESUMES, announce, refusing, shares
 from studies.files import CaseError

@@ -8,7 +8,6 @@ from typing import Annotated, Any
 from annotated_types import Gt, Unit
 
 from actuator.actuator import Actuator
-from actuator.parameters import require_known
 from actuator.parts.current_source import CurrentSource
 from actuator.parts.dc_link import DCLink
 from actuator.parts.inverter import Inverter
@@ -21,7 +20,7 @@ from actuator.simulation.signals import Signal
 from controllers.cascade import Cascade
 from controllers.pid import PID
 from controllers.sampling import Sampling
-from gear.quantities import check
+from gear.quantities import check, require_known
 from gear.transmission import Transmission
 from studies.converter import SIGNALS
 from studies.files import CaseFile, built_in_files, locate, read

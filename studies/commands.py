@@ -64,3 +64,23 @@ def announce(text: Sequence[str], written: Sequence[Path], first: str) -> None:
         click.echo(sentence)
     named = next(path for path in written if path.name == first)
     click.echo(f"written: {named} and {len(written) - 1} more files")
+
+
+class LateBar:
+    """Progress bar, created at the first progress so that errors before it are printed alone."""
+
+    def __init__(self, label: str) -> None:
+        self.label, self.bar = label, None
+
+    def move(self, done: float, length: int) -> None:
+        """Move to what is done; never back."""
+        if self.bar is None:
+            self.bar = click.progressbar(length=length, label=self.label, show_eta=False)
+            self.bar.__enter__()
+        self.bar.update(max(int(done) - self.bar.pos, 0))
+
+    def finish(self) -> None:
+        """Fill it and end its line."""
+        if self.bar is not None:
+            self.bar.update((self.bar.length or 0) - self.bar.pos)
+            self.bar.__exit__(None, None, None)

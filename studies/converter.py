@@ -10,8 +10,8 @@ from cattrs import Converter
 from cattrs.cols import is_mapping, mapping_structure_factory
 from cattrs.gen import make_dict_structure_fn
 
-from actuator.parameters import require_known
 from actuator.simulation.signals import Chirp, Constant, Gust, Ramp, Signal, Sine, Staircase, Step, Sum, Table
+from gear.quantities import require_known
 from studies.units import field_unit, is_number, spellings, split, to_si
 
 Hook = Callable[[Any, Any], Any]

@@ -26,16 +26,16 @@ from actuator import (
     trim,
     without_counts,
 )
-from actuator.hunting.causes import Causes, find_causes
-from actuator.hunting.find_sampled_orbit import find_sampled_orbit
-from actuator.hunting.flow_map import flow_map
-from actuator.hunting.margins import ENDINGS, HuntingMargin, hunting_margin
-from actuator.hunting.remedies import Remedy, RemedySearch, RemedyTable
-from actuator.hunting.sampled_orbit import SampledOrbit
-from actuator.hunting.verdict import DIVERGING
-from actuator.ledger import PREFIX
-from actuator.response.processes import processes
+from actuator.diagnosis.causes import Causes, find_causes
+from actuator.diagnosis.countermeasures import Remedy, RemedySearch, RemedyTable
+from actuator.orbits.find_sampled import find_sampled_orbit
+from actuator.orbits.flow import flow_map
+from actuator.orbits.sampled import SampledOrbit
+from actuator.simulation.processes import processes
 from actuator.simulation.signals import piece_at
+from actuator.stiction.margins import ENDINGS, HuntingMargin, hunting_margin
+from actuator.system.builder import PREFIX
+from actuator.verdict.verdict import DIVERGING
 from studies.cases import Case
 from studies.kept import actuator_of
 from studies.stages import CONVERTER, KeepingExecutor, Missing, Stages

@@ -9,11 +9,11 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from actuator import Orbit
-from actuator.hunting.margins import MOST
-from actuator.hunting.remedies import Remedy, cells
-from actuator.hunting.sampled_orbit import SampledOrbit
-from actuator.linear.plots import plot_bode
-from actuator.simulation.plots import plot_run
+from actuator.diagnosis.countermeasures import Remedy, cells
+from actuator.orbits.sampled import SampledOrbit
+from actuator.plots.linear import plot_bode
+from actuator.plots.runs import plot_run
+from actuator.stiction.margins import MOST
 from studies.findings import Findings, finite, rendered, versions
 from studies.judge import Insight, Judgment
 

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 from actuator import HybridSystem, find_orbit, follow, simulate
-from actuator.hybrid import MARGIN_BAND, Quantity
-from actuator.parameters import Parameter
+from actuator.system.hybrid import MARGIN_BAND, Quantity
+from actuator.system.parameters import Parameter
 
 
 @cache

@@ -11,11 +11,11 @@ import pytest
 from mass_on_guide import MassOnGuide
 
 from actuator import classify, simulate
-from actuator.hunting.causes import COUNTS, INTEGRAL, SAMPLING, STATIC, find_causes, removals
-from actuator.hunting.cycle_energy import energy_per_cycle
-from actuator.hunting.decide import decide
-from actuator.hunting.remedies import LADDER, find_remedies
-from actuator.hunting.remedy_candidates import candidates
+from actuator.diagnosis.candidates import candidates
+from actuator.diagnosis.causes import COUNTS, INTEGRAL, SAMPLING, STATIC, find_causes, removals
+from actuator.diagnosis.countermeasures import LADDER, find_remedies
+from actuator.diagnosis.cycle_energy import energy_per_cycle
+from actuator.verdict.decide import decide
 from studies import load_case
 
 INPUTS = {"reference": 1.0}

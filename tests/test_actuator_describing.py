@@ -7,8 +7,8 @@ from mass_on_guide import MassOnGuide
 from test_actuator_orbit import hunting
 
 from actuator import Actuator, Load, TorqueSource, find_orbit
-from actuator.hunting.describing import backlash, coulomb_friction, first_harmonic, gear_stage, predicted_cycles
-from actuator.hunting.describing_check import described_hunting
+from actuator.describing.check import described_hunting
+from actuator.describing.describing import backlash, coulomb_friction, first_harmonic, gear_stage, predicted_cycles
 from gear import Bearing, Shaft, Transmission
 
 

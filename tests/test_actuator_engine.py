@@ -27,11 +27,11 @@ from actuator import (
     TorqueSource,
     simulate,
 )
-from actuator.hybrid import Quantity
-from actuator.parameters import Parameter
 from actuator.simulation.compiled import compiler
 from actuator.simulation.engine import engine
 from actuator.simulation.prepared import EngineOptions
+from actuator.system.hybrid import Quantity
+from actuator.system.parameters import Parameter
 from controllers import PID
 from gear import Bearing, Shaft, Transmission
 

@@ -36,8 +36,8 @@ from actuator import (
 )
 from actuator.response.fourier import fourier
 from actuator.response.frequency_response import point_key
-from actuator.response.sine_stream import SinePoint
-from actuator.response.sweep import sweep
+from actuator.response.sine import SinePoint
+from actuator.simulation.sweep import sweep
 from controllers import PID, Sampling
 from gear import Bearing, KnownOil, OilAt, Shaft, Thickening, Transmission
 

@@ -26,11 +26,11 @@ from actuator import (
     simulate,
     trim,
 )
-from actuator.hunting.trace import stuck_fraction
-from actuator.hunting.turns import turning_points
-from actuator.hybrid import Quantity
 from actuator.parts.sensors import AngleSensor, Sensors
 from actuator.simulation.run import Statistics
+from actuator.system.hybrid import Quantity
+from actuator.verdict.motion_record import stuck_fraction
+from actuator.verdict.peaks import turning_points
 from controllers import PID, Sampling
 from gear import Backlash, Bearing, Coulomb, Coupling, ExternalPair, Linear, Mesh, Shaft, Transmission
 

@@ -11,7 +11,7 @@ import pytest
 from mass_on_guide import MassOnGuide
 
 from actuator import classify, simulate
-from actuator.hunting.log import classify_log, noise_of
+from actuator.verdict.log import classify_log, noise_of
 from studies import load_case
 
 

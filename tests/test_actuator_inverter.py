@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from oracles import gradient_in_symbols, in_symbols, numbers
 from scipy.integrate import solve_ivp
 
-from actuator.parameters import parameterize
 from actuator.parts.bridge import Bridge
 from actuator.parts.dc_link import BrakingChopper, DCLink
 from actuator.parts.fold_back import OverheatFoldBack, UndervoltageFoldBack
@@ -21,6 +20,7 @@ from actuator.parts.pmsm import PMSM
 from actuator.parts.pwm import bridge_duties, carrier, duties, leg_voltages, pulse
 from actuator.parts.rotor import Rotor, RotorDrag
 from actuator.parts.saturation import Saturation
+from actuator.system.parameters import parameterize
 
 LINK = 300.0
 CIRCLE = Inverter(dc_voltage=LINK, current_limit=20.0)

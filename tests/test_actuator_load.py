@@ -27,10 +27,10 @@ from actuator import (
     TorqueSource,
     simulate,
 )
-from actuator.contacts import ContactMechanics
-from actuator.hybrid import Quantity
-from actuator.parameters import parameterize
 from actuator.simulation.signals import Ramp, Sine, Step, Sum, bounds, break_points, piece_at
+from actuator.system.contacts import ContactMechanics
+from actuator.system.hybrid import Quantity
+from actuator.system.parameters import parameterize
 from gear import Bearing, Coulomb, EndStop, Linear, Mesh, ScrewPair, Shaft, Transmission
 from studies import load_case
 

@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from oracles import gradient_in_symbols, in_symbols, numbers
 from scipy.integrate import solve_ivp
 
-from actuator.parameters import parameterize
 from actuator.parts.motor import PMSM, CurrentSource, DCMotor
 from actuator.parts.park import to_axes, to_phases
 from actuator.parts.rotor import Cogging, Rotor, RotorDrag
 from actuator.parts.saturation import Saturation
 from actuator.parts.temperature import COPPER, MotorTemperature, TemperatureDependence
+from actuator.system.parameters import parameterize
 
 ROTOR = Rotor(
     cogging=Cogging(amplitude=0.02, periods=24, phase=0.3), drag=RotorDrag(eddy=2e-4, viscous=1e-4, windage=1e-7)

@@ -12,9 +12,9 @@ import pytest
 from mass_on_guide import MassOnGuide
 
 from actuator import NoOrbit, find_orbit, follow, simulate
-from actuator.hunting.flow_map import flow_map
-from actuator.hunting.passage import passage
-from actuator.hunting.sampled_orbit import SampledOrbit
+from actuator.orbits.flow import flow_map
+from actuator.orbits.sampled import SampledOrbit
+from actuator.orbits.segments import passage
 from controllers import Sampling
 
 GUIDE = "gear.bearings.guide"

@@ -9,7 +9,6 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from oracles import PAPER_PAIR, in_symbols, numbers
 
-from actuator.parameters import parameterize, require_known
 from actuator.parts.inverter import Inverter
 from actuator.parts.load import Load
 from actuator.parts.motor import PMSM, DCMotor, TorqueSource
@@ -27,7 +26,9 @@ from actuator.simulation.signals import (
     break_points,
     piece_at,
 )
+from actuator.system.parameters import parameterize
 from gear import Backlash, Bearing, Coulomb, Linear, Mesh, Shaft, Transmission
+from gear.quantities import require_known
 
 ROUND = PMSM(pole_pairs=4, resistance=0.5, inductance_d=2e-3, inductance_q=2e-3, flux=0.05, inertia=1e-4)
 SALIENT = PMSM(pole_pairs=3, resistance=0.8, inductance_d=3e-3, inductance_q=8e-3, flux=0.1, inertia=1e-4)

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from actuator import Actuator, TorqueSource, classify, simulate
-from actuator.hunting.bisection import bisect_by_simulation
-from actuator.hunting.find_sampled_orbit import find_sampled_orbit
-from actuator.hunting.flow_map import NoOrbit
-from actuator.hunting.sampled_boundary import follow_sampled
+from actuator.continuation.bisection import bisect_by_simulation
+from actuator.continuation.sampled import follow_sampled
+from actuator.orbits.find_sampled import find_sampled_orbit
+from actuator.orbits.flow import NoOrbit
 from controllers import PID, Sampling
 from gear import Bearing, Shaft, Transmission
 

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from oracles import in_symbols, numbers
 from scipy import stats
 
-from actuator.parameters import parameterize
 from actuator.parts.noise import MODULUS, WhiteNoise, following
 from actuator.parts.sensors import AngleSensor, CurrentSensor, quantized
+from actuator.system.parameters import parameterize
 
 STEP = 2 * math.pi / 4096
 

@@ -10,8 +10,8 @@ from oracles import in_symbols, numbers
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from actuator.parameters import parameterize
 from actuator.parts.thermal import ThermalNetwork, ThermalNode, ThermalPath
+from actuator.system.parameters import parameterize
 
 AMBIENT = 263.15
 NETWORK = ThermalNetwork(

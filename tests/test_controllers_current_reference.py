@@ -9,7 +9,7 @@ from oracles import in_symbols, numbers
 from scipy.optimize import minimize_scalar
 
 from controllers import CurrentReference
-from controllers.rules import Scalar
+from gear.quantities import Scalar
 
 IPM = CurrentReference(pole_pairs=3, flux=0.545, inductance_d=0.036, inductance_q=0.051)  # 2.2 kW
 RELUCTANT = CurrentReference(pole_pairs=2, flux=0.05, inductance_d=0.01, inductance_q=0.06)

@@ -333,8 +333,14 @@ def test_laws_are_the_same_in_numbers_and_in_symbols(law, values):
         (lambda: PI(proportional=1.0, integral=-1.0), r"PI.integral must be >= 0 output/\(error s\), got -1"),
         (lambda: PI(proportional=1.0, integral=1.0, limit=0.0), "PI.limit must be > 0 output, got 0"),
         (lambda: PI(proportional=1.0, integral=1.0, back_calculation=-1.0), "PI.back_calculation must be >= 0 1/s"),
-        (lambda: PI(proportional=math.nan, integral=1.0), "PI.proportional must be > 0 output/error, got nan"),
-        (lambda: PI(proportional=True, integral=1.0), "PI.proportional must be > 0 output/error, got True"),
+        (
+            lambda: PI(proportional=math.nan, integral=1.0),
+            "PI.proportional must be a finite number .output/error., got nan",
+        ),
+        (
+            lambda: PI(proportional=True, integral=1.0),
+            "PI.proportional must be a finite number .output/error., got True",
+        ),
         (
             lambda: PID(proportional=1.0, integral=1.0, derivative=1.0, filter_time=0.0),
             "PID.filter_time must be > 0 s, got 0",

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from oracles import in_symbols, numbers
 
 from controllers import PI, PID, P, Sampling, ScheduledGain
-from controllers.rules import Scalar
+from gear.quantities import Scalar
 
 TABLE = ScheduledGain(over="temperature", points=(220.0, 260.0, 300.0), values=(2.0, 1.5, 1.0))
 

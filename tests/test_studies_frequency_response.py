@@ -194,7 +194,7 @@ def test_a_mask_is_kept_or_missed_and_the_second_study_computes_nothing(
     def never(*arguments, **others):
         raise AssertionError("a finished point was computed again")
 
-    monkeypatch.setattr("actuator.response.sine_stream.SineStream.measure", never)
+    monkeypatch.setattr("actuator.response.sine.SineStream.measure", never)
     monkeypatch.setattr("studies.frequency.bench.BenchWork.__call__", never)
     (kept,) = (folder / "out").glob("finished.jsonl")
     (tmp_path / kept.name).write_text(kept.read_text())
@@ -219,7 +219,7 @@ def test_a_killed_study_goes_on_where_it_stopped(folder, outcome, tmp_path, with
     computed = []
     measure = SineStream.measure
     monkeypatch.setattr(
-        "actuator.response.sine_stream.SineStream.measure",
+        "actuator.response.sine.SineStream.measure",
         lambda self, point: computed.append(point) or measure(self, point),
     )
     again = invoke(*options(folder), "--out", tmp_path)
@@ -303,7 +303,7 @@ def test_a_corner_is_the_case_with_its_parameters_and_all_but_its_sines_are_ther
     (tmp_path / kept.name).write_text(kept.read_text())
     computed, measure = [], SineStream.measure
     monkeypatch.setattr(
-        "actuator.response.sine_stream.SineStream.measure",
+        "actuator.response.sine.SineStream.measure",
         lambda self, point: computed.append(point) or measure(self, point),
     )
     heavy = ("--corner", "heavy: gear.shafts.mass.inertia=3", "--bias", BIAS)

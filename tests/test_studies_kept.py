@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 import actuator
 from actuator import SinePoint, SineStream
 from actuator.response.frequency_response import point_key
-from actuator.response.processes import processes
+from actuator.simulation.processes import processes
 from studies.cases import load_case
 from studies.kept import FILE, PACKAGES, Kept, actuator_of, kept_in, program, source
 from studies.stages import KeepingExecutor, Missing, Stages

@@ -15,8 +15,8 @@ import pytest
 from click.testing import CliRunner
 
 from actuator import Actuator, CurrentSource, Load, TorqueSource, loop_transfer, margins, trim
-from actuator.hunting.margins import at_least_sliding, sliding_of
-from actuator.linear.gain_models import Response, gain_model
+from actuator.linear.derivatives.continuous import Response, gain_model
+from actuator.stiction.margins import at_least_sliding, sliding_of
 from controllers import Cascade, IntegralRemedies
 from controllers.pid import PI, PID, P
 from gear import Bearing, Shaft, Stribeck, Transmission

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from actuator import Actuator, AngleSensor, CurrentSource, Load, Sensors, linearize, loop_transfer, trim
-from actuator.linear.gain_models import gain_model
-from actuator.linear.lifted_margins import lifted_margins
-from actuator.linear.sampled_gains import sampled_gain_model
+from actuator.linear.derivatives.build_sampled import sampled_gain_model
+from actuator.linear.derivatives.continuous import gain_model
+from actuator.linear.margins.lifted import lifted_margins
 from controllers import Cascade, Sampling
 from controllers.pid import PI, P
 from gear import Bearing, Shaft, Transmission

@@ -32,7 +32,7 @@ from actuator import (
     Step,
     simulate,
 )
-from actuator.hybrid import Quantity
+from actuator.system.hybrid import Quantity
 from controllers import Cascade, Sampling
 from gear import Backlash, Bearing, Coulomb, Coupling, ExternalPair, Linear, Mesh, Shaft, Transmission
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from actuator import classify, find_orbit, rest, rest_set, simulate
-from actuator.hunting.passage import passage
+from actuator.orbits.segments import passage
 from studies import load_case
 
 DURATION = 20.0  # s

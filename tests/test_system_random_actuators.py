@@ -11,8 +11,8 @@ import pytest
 from random_actuators import draw
 
 from actuator import simulate
-from actuator.hybrid import MARGIN_BAND
 from actuator.simulation.run import STUCK
+from actuator.system.hybrid import MARGIN_BAND
 from gear.mesh import MESH_SPEED_NOMINAL
 from gear.transmission import BEARING_SPEED_NOMINAL
 

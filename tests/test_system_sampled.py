@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from actuator import Actuator, HybridSystem, Ramp, Sine, Step, TorqueSource, simulate
-from actuator.hybrid import Clock, Quantity
+from actuator.system.hybrid import Clock, Quantity
 from controllers import PID, Sampling
 from gear import Bearing, Shaft, Transmission
 from studies import load_case

@@ -5,9 +5,9 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 
-from actuator.hybrid import HybridSystem
 from actuator.linear.locked import eliminated, slips
 from actuator.linear.operating_point import OperatingPoint
+from actuator.system.hybrid import HybridSystem
 
 STILL = 1e-9  # rate of a state over its nominal size [1/s] that counts as zero
 ROUNDING, MOST_ROUNDING = 100 * np.finfo(float).eps, 1e-2

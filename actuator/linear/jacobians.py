@@ -5,8 +5,8 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 
-from actuator.hybrid import HybridSystem
 from actuator.linear.operating_point import OperatingPoint
+from actuator.system.hybrid import HybridSystem
 
 STEPPED = ("resolution", "noise")  # fields of a sensor that make steps of its readings
 

@@ -6,14 +6,14 @@ from typing import Any, NamedTuple
 import control
 import numpy as np
 
-from actuator.hybrid import HybridSystem
-from actuator.ledger import PREFIX
 from actuator.linear.balance import rounding
 from actuator.linear.jacobians import jacobians, require_smooth
 from actuator.linear.locked import unlocked
 from actuator.linear.operating_point import NoEquilibrium, OperatingPoint
 from actuator.linear.sampled import lifted
-from actuator.parameters import require_known
+from actuator.system.builder import PREFIX
+from actuator.system.hybrid import HybridSystem
+from gear.quantities import require_known
 
 CANCELED = 8 * np.finfo(float).eps  # part that is left by rounding of what the opened loop had fed back
 RESIDUAL = 1e-5  # rate of a state over its nominal size [1/s]

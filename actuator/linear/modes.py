@@ -9,14 +9,14 @@ import control
 import numpy as np
 
 from actuator.actuator import Actuator
-from actuator.hybrid import HybridSystem
-from actuator.linear.loop_margins import CUT, SLOW, Margins, margins
+from actuator.linear.margins.crossings import CUT, SLOW, Margins, margins
 from actuator.linear.model import linearize, loop_transfer
 from actuator.linear.operating_point import MOTIONS, NoEquilibrium, OperatingPoint
 from actuator.linear.sampled import without_counts
 from actuator.linear.trim import trim
-from actuator.parameters import require_known
 from actuator.simulation.run import FREE, STUCK, contact_labels, contact_names
+from actuator.system.hybrid import HybridSystem
+from gear.quantities import require_known
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -112,7 +112,7 @@ class ModeModels:
 
     def plot(self, at: str) -> "Figure":
         """Bode plot of the loop opened at a named signal, a line per mode in front of the envelope."""
-        from actuator.linear.plots import plot_modes
+        from actuator.plots.linear import plot_modes
 
         return plot_modes(self.loops(at), f"loop opened at {at.replace('_', ' ')}")
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuator.hybrid import HybridSystem
-from actuator.parameters import require_known
 from actuator.simulation.run import contact_names
+from actuator.system.hybrid import HybridSystem
+from gear.quantities import require_known
 
 MOTIONS = {"stuck": 0, "forward": 1, "backward": -1}
 STOPS = "gear.stops."  # what the flanks of end stops are called

@@ -6,7 +6,7 @@ import control
 import numpy as np
 from scipy.linalg import hessenberg, matrix_balance, schur, solve_sylvester
 
-from actuator.linear.loop_response import GRID, NOTHING, LoopResponse
+from actuator.linear.margins.response import GRID, NOTHING, LoopResponse
 
 HIDDEN = 1e-10 * 0.1 ** np.arange(7)  # parts of the model by which a state may be moved, or seen, by rounding
 SAME, SLOW = 1e-2, 1e-2  # part of the response that may change above SLOW [rad/s] by what is left out

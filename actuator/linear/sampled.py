@@ -14,8 +14,8 @@ from scipy.linalg import expm
 from actuator.actuator import Actuator
 from actuator.linear.jacobians import jacobians, require_smooth, tick_jacobians
 from actuator.linear.operating_point import OperatingPoint
-from actuator.parameters import require_known
 from actuator.parts.sensors import AngleSensor, CurrentSensor
+from gear.quantities import require_known
 
 
 def without_counts(actuator: Actuator) -> Actuator:

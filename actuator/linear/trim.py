@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from actuator.actuator import Actuator
-from actuator.hybrid import HybridSystem
 from actuator.linear.balance import Balance
 from actuator.linear.operating_point import STOPS, NoEquilibrium, OperatingPoint, modes_of, usual_flank
-from actuator.parameters import require_known
 from actuator.simulation.run import contact_labels
+from actuator.system.hybrid import HybridSystem
+from gear.quantities import require_known
 
 STEPS = 60  # Newton steps; the equations of a mode are nearly linear
 POLISH = 3  # more of them once the residual is small, as long as it falls

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from actuator.parameters import require_known
 from actuator.parts.electrical import HeatCapacity, HeatResistance
-from gear.quantities import Scalar, Temperature, check
+from gear.quantities import Scalar, Temperature, check, require_known
 
 
 @dataclass(frozen=True, kw_only=True)

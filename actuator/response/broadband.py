@@ -5,13 +5,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from actuator.actuator import Actuator
-from actuator.hybrid import HybridSystem
 from actuator.response.fourier import fourier
 from actuator.response.record import PER_PERIOD, Record, Spectrum
-from actuator.response.standstill import rest_of
 from actuator.simulation.run import Run
 from actuator.simulation.signals import Chirp, Sine, Sum
 from actuator.simulation.simulate import simulate
+from actuator.stiction.standstill import rest_of
+from actuator.system.hybrid import HybridSystem
 
 
 def chirp_response(  # noqa: PLR0913 - a sweep has this many numbers

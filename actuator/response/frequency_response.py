@@ -12,9 +12,9 @@ import numpy as np
 import xarray
 
 from actuator.actuator import Actuator
-from actuator.hybrid import HybridSystem
-from actuator.response.sine_stream import SinePoint, SineResponse, SineStream
-from actuator.response.sweep import sweep
+from actuator.response.sine import SinePoint, SineResponse, SineStream
+from actuator.simulation.sweep import sweep
+from actuator.system.hybrid import HybridSystem
 from gear.lubricant import at_temperature
 
 if TYPE_CHECKING:
@@ -90,13 +90,13 @@ class FrequencyResponse:
 
         `overlay` holds measured spectra, `where` places on the dimensions set, load and output.
         """
-        from actuator.response.response_plots import plot_responses
+        from actuator.plots.response import plot_responses
 
         return plot_responses(self, linear, overlay, **where)
 
     def plot_harmonics(self, **where: Any) -> "Figure":
         """Harmonics over the fundamental, a line per amplitude; `where` as for `plot`."""
-        from actuator.response.response_plots import plot_harmonics
+        from actuator.plots.response import plot_harmonics
 
         return plot_harmonics(self, **where)
 

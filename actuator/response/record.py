@@ -47,7 +47,7 @@ class Spectrum:
 
     def plot(self) -> "Figure":
         """Gain, phase and coherence."""
-        from actuator.response.response_plots import plot_spectrum
+        from actuator.plots.response import plot_spectrum
 
         return plot_spectrum(self)
 

@@ -9,9 +9,9 @@ import numpy as np
 import xarray
 
 from actuator.actuator import Actuator
-from actuator.hybrid import HybridSystem
 from actuator.parts.motor import TorqueSource
 from actuator.response.frequency_response import FrequencyResponse, frequency_response
+from actuator.system.hybrid import HybridSystem
 from gear.transmission import Bearing
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ class DynamicStiffness:
 
     def plot(self, **where: Any) -> "Figure":
         """Size and phase of the stiffness over frequency, a line per amplitude."""
-        from actuator.response.bench_plots import plot_stiffness
+        from actuator.plots.bench import plot_stiffness
 
         return plot_stiffness(self, **where)
 

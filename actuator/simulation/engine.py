@@ -11,13 +11,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from actuator.hybrid import HybridSystem
 from actuator.simulation.checked_ticks import ticks_that_hold
 from actuator.simulation.checked_window import checked_window
 from actuator.simulation.prepared import EngineOptions, Prepared
 from actuator.simulation.signals import Piece
 from actuator.simulation.window import INTERVALS
 from actuator.simulation.window_points import Window
+from actuator.system.hybrid import HybridSystem
 
 ON_TIME = 1e-9  # part of a period within which an instant is that of a tick
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from actuator.hybrid import HybridSystem
+from actuator.system.hybrid import HybridSystem
 
 
 class SimulationError(RuntimeError):

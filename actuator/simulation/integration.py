@@ -19,9 +19,9 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from actuator.hybrid import HybridSystem
 from actuator.simulation.input_form import InputForm
 from actuator.simulation.mode_code import EventLog, ModeCode
+from actuator.system.hybrid import HybridSystem
 
 EVENT_TOLERANCE = 1e-14  # part of a window
 MAX_EVENTS = 500  # in one window; with more it is run again in halves, and is chattering if that does not help

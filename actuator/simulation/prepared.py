@@ -9,12 +9,12 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from actuator.hybrid import HybridSystem
 from actuator.simulation.compiled import compiled_where_wanted
 from actuator.simulation.failures import inconsistent
 from actuator.simulation.input_form import InputForm
 from actuator.simulation.mode_code import ModeCode
 from actuator.simulation.window import INTERVALS, ticks_function, window_function
+from actuator.system.hybrid import HybridSystem
 
 
 @dataclass(frozen=True)

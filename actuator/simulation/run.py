@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from actuator.hybrid import HybridSystem
-from actuator.parameters import require_known
+from actuator.system.hybrid import HybridSystem
+from gear.quantities import require_known
 
 if TYPE_CHECKING:
     import xarray
@@ -137,7 +137,7 @@ class Run:
 
     def plot(self, names: Sequence[str] = ("motor_angle", "load_angle", "motor_torque")) -> "Figure":
         """Signals above a ribbon of the contact modes."""
-        from actuator.simulation.plots import plot_run
+        from actuator.plots.runs import plot_run
 
         return plot_run(self, names)
 

@@ -8,15 +8,16 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from actuator.actuator import Actuator
-from actuator.fitting import require_within_stops
-from actuator.hybrid import HybridSystem
-from actuator.parameters import require_known, with_values
 from actuator.simulation.engine import engine
 from actuator.simulation.prepared import EngineOptions
 from actuator.simulation.run import Run, Statistics
 from actuator.simulation.signals import Constant, Signal, bounds, break_points, piece_at
 from actuator.simulation.window import INTERVALS
 from actuator.simulation.window_points import Window, join
+from actuator.system.compatibility import require_within_stops
+from actuator.system.hybrid import HybridSystem
+from actuator.system.parameters import with_values
+from gear.quantities import require_known
 
 DEFAULT_POINTS = 2000
 ALMOST = 1 - 1e-12  # a ratio that is whole but for rounding

@@ -7,10 +7,10 @@ integration, and so on.
 import casadi as ca
 import numpy as np
 
-from actuator.hybrid import HybridSystem
 from actuator.simulation.input_form import InputForm
 from actuator.simulation.integration import integration, observed
 from actuator.simulation.mode_code import LOG_SLOTS, ModeCode
+from actuator.system.hybrid import HybridSystem
 
 INTERVALS = 200  # output intervals of one window
 VIOLATION = 1e-9  # a margin below minus this is a missed event, not rounding

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from scipy.optimize import brentq
 
 from actuator import Run, simulate
-from actuator.simulation.plots import plot_run
+from actuator.plots.runs import plot_run
 from gear import (
     Backlash,
     Bearing,

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
-from actuator.parameters import with_values
+from actuator.system.parameters import with_values
 from studies.cases import Case, built_in, load_case
 from studies.files import CaseError
 from studies.frequency.corners import WrongRequest

@@ -25,7 +25,7 @@ from actuator import (
     triangle_test,
     unpowered,
 )
-from actuator.response.bench import Numbers
+from actuator.response.bench.steps import Numbers
 from studies.findings import png
 
 SMALLEST = 1e-5  # of the stroke, from which the threshold is sought

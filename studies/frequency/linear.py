@@ -16,7 +16,7 @@ from actuator import (
     mode_models,
     poles,
 )
-from actuator.ledger import PREFIX
+from actuator.system.builder import PREFIX
 from studies.frequency.corners import Place
 from studies.frequency.sensitivity import Peak, Sensitivities, peak_of, sensitivities
 

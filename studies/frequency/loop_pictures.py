@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from actuator.linear.plots import EDGE, LINE_COLORS, LINE_STYLES, MOST_NAMES, SHADE, decibel, plot_modes
+from actuator.plots.linear import EDGE, LINE_COLORS, LINE_STYLES, MOST_NAMES, SHADE, decibel, plot_modes
 from actuator.simulation.run import FREE
 from studies.frequency.sensitivity import Peak, Sensitivities
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from actuator import Spectrum
-from actuator.response.response_plots import FAILED, READING, STILL, draw_responses, plain_hertz
+from actuator.plots.response import FAILED, READING, STILL, draw_responses, plain_hertz
 from studies.frequency.corners import Place
 from studies.frequency.mask import Mask, phase_of
 from studies.frequency.study import Study

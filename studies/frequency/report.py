@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from actuator import LiftedMargins, Margins, Spectrum
-from actuator.linear.plots import plot_modes
+from actuator.plots.linear import plot_modes
 from studies.findings import Findings, versions
 from studies.frequency.loop_pictures import plot_compliance, plot_sensitivities
 from studies.frequency.mask import LimitCheck

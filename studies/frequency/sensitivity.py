@@ -7,7 +7,7 @@ from typing import NamedTuple
 import control
 import numpy as np
 
-from actuator.linear.loop_margins import CUT, SLOW
+from actuator.linear.margins.crossings import CUT, SLOW
 from actuator.linear.modes import FREQUENCIES
 
 FINER, POINTS = 3, 41  # times that a peak is sought on a finer grid, of so many points; odd: the best is one of them

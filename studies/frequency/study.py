@@ -20,8 +20,8 @@ from actuator import (
     torque_speed_curve,
     unpowered,
 )
-from actuator.response.sweep import sweep
 from actuator.simulation.signals import piece_at
+from actuator.simulation.sweep import sweep
 from studies.cases import Case
 from studies.frequency.bench import CORNERS, TESTS, BenchPlan, BenchWork
 from studies.frequency.corners import Place, WrongRequest

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from actuator import NoOrbit, SimulationError, find_orbit, follow
-from actuator.hunting.branch import BOUND
-from actuator.hunting.verdict import IRREGULAR, REST
+from actuator.continuation.branch import BOUND
+from actuator.verdict.verdict import IRREGULAR, REST
 from studies.hunting.map import Index, Plan, load, made_once, seen_at
 from studies.hunting.settings import meaning
 from studies.stages import Stages

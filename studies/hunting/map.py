@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 
 from actuator import SimulationError
-from actuator.hunting.decide import decide
-from actuator.hunting.verdict import REST, VERDICTS, Hunting
-from actuator.response.processes import processes
+from actuator.simulation.processes import processes
 from actuator.simulation.run import Run
+from actuator.verdict.decide import decide
+from actuator.verdict.verdict import REST, VERDICTS, Hunting
 from studies.cases import Case, load_case
 from studies.hunting.settings import Setting, meaning, parameters_of
 from studies.kept import actuator_of

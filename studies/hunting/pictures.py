@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from actuator.hunting.plots import VERDICT_COLORS
-from actuator.hunting.verdict import DIVERGING
+from actuator.plots.diagnosis import VERDICT_COLORS
+from actuator.verdict.verdict import DIVERGING
 from studies.hunting.map import FAILED, LABELS
 
 if TYPE_CHECKING:

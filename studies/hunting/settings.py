@@ -13,9 +13,9 @@ from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from typing import NamedTuple
 
-from actuator.hunting.margins import at_least_sliding
-from actuator.hybrid import HybridSystem
-from actuator.parameters import require_known
+from actuator.stiction.margins import at_least_sliding
+from actuator.system.hybrid import HybridSystem
+from gear.quantities import require_known
 
 FACTOR_UNIT = "-"
 

@@ -7,7 +7,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from actuator.hunting.causes import INTEGRALS
+from actuator.diagnosis.causes import INTEGRALS
 from studies.findings import Findings
 from studies.hunting.ends import CYCLES, EndPoint, along, crossings, ends, with_boundary
 from studies.hunting.map import FAILED, LABELS, Axis, Plan, compute, dataset, load

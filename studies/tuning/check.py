@@ -8,16 +8,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from actuator.actuator import Actuator
-from actuator.hunting.decide import decide
-from actuator.hunting.margins import SLIDING, at_least_sliding
-from actuator.hunting.verdict import REST, Hunting, classify
-from actuator.response.sine_stream import SinePoint, SineStream
-from actuator.response.standstill import rest_of
-from actuator.response.sweep import sweep
+from actuator.response.sine import SinePoint, SineStream
 from actuator.simulation.failures import SimulationError
 from actuator.simulation.run import Run
 from actuator.simulation.signals import Step
 from actuator.simulation.simulate import simulate
+from actuator.simulation.sweep import sweep
+from actuator.stiction.margins import SLIDING, at_least_sliding
+from actuator.stiction.standstill import rest_of
+from actuator.verdict.decide import decide
+from actuator.verdict.verdict import REST, Hunting, classify
 from studies.kept import fingerprint
 from studies.specification import Corner, Demand
 from studies.tuning.plant import defaults_of

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from actuator.actuator import Actuator
-from actuator.hunting.margins import SLIDING, sliding_of
 from actuator.linear.balance import rates_function, rounding
 from actuator.linear.modes import mode_models
 from actuator.linear.operating_point import NoEquilibrium, OperatingPoint
 from actuator.linear.trim import trim
+from actuator.stiction.margins import SLIDING, sliding_of
 from studies.specification import Corner
 from studies.tuning.plant import defaults_of
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from actuator.linear.gain_models import Response
+from actuator.linear.derivatives.continuous import Response
 from studies.tuning.models import Curves
 
 NONE = math.log(100.0)  # |ln| of a gain margin where there is no crossing

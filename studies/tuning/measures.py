@@ -28,7 +28,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from actuator.linear.gain_models import Value
+from actuator.linear.derivatives.continuous import Value
 from actuator.linear.operating_point import OperatingPoint
 from studies.specification import Demand
 from studies.tuning.corners import CornerModes, in_flight, moved

@@ -7,11 +7,11 @@ from functools import cached_property
 
 import numpy as np
 
-from actuator.ledger import PREFIX
-from actuator.linear.gain_models import GainModel, gain_model
+from actuator.linear.derivatives.build_sampled import sampled_gain_model
+from actuator.linear.derivatives.continuous import GainModel, gain_model
+from actuator.linear.derivatives.sampled import SampledGainModel
 from actuator.linear.operating_point import OperatingPoint
-from actuator.linear.sampled_gain_model import SampledGainModel
-from actuator.linear.sampled_gains import sampled_gain_model
+from actuator.system.builder import PREFIX
 from studies.tuning.plant import loops_of
 
 FREQUENCIES = 2 * np.pi * np.logspace(-1.5, 3.5, 240)  # rad/s

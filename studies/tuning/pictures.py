@@ -5,9 +5,9 @@ import math
 import numpy as np
 from matplotlib.figure import Figure
 
-from actuator.response.standstill import rest_of
 from actuator.simulation.signals import Step
 from actuator.simulation.simulate import simulate
+from actuator.stiction.standstill import rest_of
 from studies.tuning.check import BEFORE
 from studies.tuning.corners import corner_modes, moved
 from studies.tuning.measures import worst

@@ -6,10 +6,10 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from actuator.actuator import Actuator
-from actuator.hybrid import HybridSystem
-from actuator.ledger import PREFIX
 from actuator.linear.sampled import without_counts
-from actuator.parameters import Parameter
+from actuator.system.builder import PREFIX
+from actuator.system.hybrid import HybridSystem
+from actuator.system.parameters import Parameter
 from controllers.cascade import Cascade
 from controllers.integral import IntegralRemedies
 from controllers.pid import PI, PID, P

@@ -9,9 +9,9 @@ from collections.abc import Callable, Mapping, MutableMapping, Sequence
 from typing import Any, NamedTuple
 
 from actuator.actuator import Actuator
-from actuator.hunting.margins import sliding_of
-from actuator.hunting.verdict import REST
-from actuator.response.sweep import sweep
+from actuator.simulation.sweep import sweep
+from actuator.stiction.margins import sliding_of
+from actuator.verdict.verdict import REST
 from studies.kept import fingerprint
 from studies.specification import Corner, Demand
 from studies.tuning.check import Bench, step_trials

@@ -1,0 +1,1 @@
+"""Families of orbits over a parameter, and where hunting ends."""

@@ -1,0 +1,156 @@
+"""How a family of orbits ends: what the last step along it has come across, and what is about to disappear.
+
+A family turns back at a fold, or at a corner where its sequence of modes changes; multipliers leave the unit circle;
+the period grows or the amplitude shrinks without end; or no step leads on, and the last orbit tells why.
+"""
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from actuator.continuation.branch import (
+    BOUND,
+    COLLISION,
+    ENDLESS,
+    FOLD,
+    GRAZING,
+    LOSS_OF_STICK,
+    LOST,
+    PERIOD_DOUBLING,
+    TORUS,
+    VANISHES,
+    End,
+)
+from actuator.orbits.flow import along
+from actuator.orbits.orbit import Orbit
+from actuator.simulation.run import STUCK, contact_labels
+
+LONG, SMALL = 50.0, 0.02  # times the first period, part of the first amplitude
+BRIEF, TOUCHES = 0.02, 0.02  # part of the period, and of the usual size of a margin: what is about to disappear
+SHORTENS = 1e-4  # part of a standstill by which it gets shorter at least, from orbit to orbit
+
+
+class Point(NamedTuple):
+    """An orbit of the family with its tangent."""
+
+    orbit: Orbit
+    value: float
+    tangent: np.ndarray  # (n + 1,), in states over `size` and the parameter over `width`
+
+
+@dataclass(frozen=True)
+class BranchEnds:
+    """The end of a family that is followed in a parameter between its bounds."""
+
+    first: Orbit
+    bounds: tuple[float, float]
+    size: np.ndarray  # of the motion, by state
+
+    def crossed(self, points: list[Point], point: Point) -> End | None:
+        """What a step has come across."""
+        last = points[-1]
+        if last.tangent[-1] * point.tangent[-1] < 0 and point.orbit.sequence != last.orbit.sequence:
+            return _corner(points, point)
+        if last.tangent[-1] * point.tangent[-1] < 0:
+            a, b = last.tangent[-1], point.tangent[-1]
+            width = self.bounds[1] - self.bounds[0]
+            chord = np.append((point.orbit.x0 - last.orbit.x0) / self.size, (point.value - last.value) / width)
+            # the slope of the parameter along the family is nearly a line here: integrate it up to its zero
+            value = last.value + width * a * np.linalg.norm(chord) * a / (a - b) / 2
+            return End(FOLD, float(value), "the family turns back: no cycle of it exists beyond this value")
+        return _unstable(last, point) or self._limits(last, point)
+
+    def _limits(self, last: Point, point: Point) -> End | None:
+        """Bounds, and what grows or shrinks without end."""
+        if not self.bounds[0] < point.value < self.bounds[1]:
+            value = float(np.clip(point.value, *self.bounds))
+            return End(BOUND, value, "the family goes on beyond the bound")
+        start = self.first
+        if point.orbit.period > LONG * start.period:
+            value = self._zero(last, point, lambda orbit: 1 / orbit.period)
+            return End(ENDLESS, value, f"the period has grown to {point.orbit.period:.4g} s and goes on growing")
+        if point.orbit.load_amplitude < SMALL * start.load_amplitude:
+            value = self._zero(last, point, lambda orbit: orbit.load_amplitude)
+            return End(VANISHES, value, f"the amplitude has shrunk to {point.orbit.load_amplitude:.3g} rad")
+        return None
+
+    def _zero(self, last: Point, point: Point, measure: Callable[[Orbit], float]) -> float:
+        """Where a measure of the orbits reaches zero, on the line through two of them."""
+        a, b = measure(last.orbit), measure(point.orbit)
+        return float(np.clip(point.value + (point.value - last.value) * b / (a - b), *self.bounds))
+
+
+def ended(points: list[Point], reason: str) -> End:
+    """What is about to disappear on the last orbit, from which no step leads on."""
+    last = points[-1].orbit
+    value = points[-1].value
+    if _standstills(last) and _shortest_standstill(last) < BRIEF * last.period:
+        return End(_loss(last), value, f"a standstill of {_shortest_standstill(last):.3g} s disappears; {reason}")
+    worst = _nearest_touch(last)
+    if worst[0] < TOUCHES:
+        return End(GRAZING, value, f"{worst[1]} comes down to {worst[0]:.3g} of its usual size; {reason}")
+    return End(LOST, value, reason)
+
+
+def _unstable(last: Point, point: Point) -> End | None:
+    """Where multipliers leave the unit circle elsewhere than at 1."""
+    mu, before = point.orbit.multipliers[0], last.orbit.multipliers[0]
+    if not last.orbit.stable or point.orbit.stable:
+        return None
+    value = float(last.value + (1 - abs(before)) / (abs(mu) - abs(before)) * (point.value - last.value))
+    if abs(mu.imag) > 1e-6 * abs(mu):  # noqa: PLR2004 - a pair
+        return End(TORUS, value, f"a pair of multipliers leaves the unit circle, at {mu:.4g}")
+    return End(PERIOD_DOUBLING, value, f"a multiplier leaves the unit circle at {mu:.4g}") if mu.real < 0 else None
+
+
+def _corner(points: list[Point], point: Point) -> End:
+    """A family that turns back where its sequence of modes changes: not smoothly, at a corner."""
+    last = points[-1]
+    gone = _standstills(last.orbit) - _standstills(point.orbit)
+    brief = _standstills(last.orbit) > 0 and _shortest_standstill(last.orbit) < BRIEF * last.orbit.period
+    if gone <= 0 and not brief:
+        return End(GRAZING, last.value, "the family turns back where a contact touches another mode")
+    shortest, value = _shortest_standstill(last.orbit), last.value
+    if len(points) > 1 and points[-2].orbit.sequence == last.orbit.sequence:
+        before = _shortest_standstill(points[-2].orbit)
+        value += (last.value - points[-2].value) * shortest / max(before - shortest, SHORTENS * before)
+        reach = abs(last.value - points[-2].value) + abs(point.value - last.value)
+        value = float(np.clip(value, last.value - reach, last.value + reach))
+    return End(_loss(last.orbit), value, f"a standstill of {shortest:.3g} s disappears, and the family turns back")
+
+
+def _stands(orbit: Orbit) -> list[float]:
+    """Durations of the stretches in which some contact sticks, in one sequence of modes."""
+    found: list[float] = []
+    for modes, group in itertools.groupby(orbit.segments, key=lambda segment: segment.modes):
+        if STUCK in contact_labels(orbit.system.modes, modes).values():
+            found.append(sum(segment.duration for segment in group))
+    return found
+
+
+def _standstills(orbit: Orbit) -> int:
+    return len(_stands(orbit))
+
+
+def _shortest_standstill(orbit: Orbit) -> float:
+    return min(_stands(orbit))
+
+
+def _loss(orbit: Orbit) -> str:
+    """What it is that a brief standstill disappears: the end of all sticking, or a border between two sequences."""
+    return LOSS_OF_STICK if max(_stands(orbit)) < 2 * BRIEF * orbit.period else COLLISION
+
+
+def _nearest_touch(orbit: Orbit) -> tuple[float, str]:
+    """Smallest minimum of a margin inside a segment, and its name."""
+    found = (np.inf, "")
+    for segment, start in zip(orbit.segments, orbit.starts, strict=True):
+        states = orbit.map.path(start, segment.modes, orbit.u, orbit.p, segment.duration)
+        margins = along(orbit.system.margins, states, segment.modes, orbit.u, orbit.p)
+        inside = (margins[:, 1:-1] < margins[:, :-2]) & (margins[:, 1:-1] < margins[:, 2:])
+        for row, k in zip(*np.nonzero(inside), strict=True):
+            found = min(found, (float(margins[row, k + 1]), orbit.system.margin_names[row]))
+    return found

@@ -1,0 +1,1 @@
+"""Describing functions: the textbook's prediction of hunting, held against simulation."""

@@ -1,0 +1,1 @@
+"""Why it hunts, and what helps."""

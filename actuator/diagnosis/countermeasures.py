@@ -1,0 +1,230 @@
+"""What helps against hunting: every remedy that suits the controller, simulated and ranked."""
+
+import math
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from actuator.actuator import Actuator
+from actuator.diagnosis.candidates import Candidate, candidates
+from actuator.simulation.run import Run
+from actuator.simulation.signals import Signal
+from actuator.simulation.simulate import simulate
+from actuator.verdict.decide import decide
+from actuator.verdict.motion_record import trace_of
+from actuator.verdict.verdict import REST, Hunting, classify
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LADDER = (1.0, 1.4, 2.0, 2.8, 4.0)  # factors on breakaway friction that are tried
+BREAKAWAY = (".breakaway", ".static")
+CYCLES = 5.0  # periods of the cycle that a run with a remedy's own motion lasts
+NOTHING = 1e-6  # rad; an error that is none
+MOST_FORCED, SAME = 3.5, 0.02  # periods of a remedy's own motion after which a cycle may repeat, and how exactly
+UNKNOWN = float("nan")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Remedy:
+    """What a remedy does.
+
+    Attributes
+    ----------
+    name, setting : str
+        What was done.
+    predicted_error : float
+        Largest error [rad] at which it may rest; nan without a prediction.
+    hunting : Hunting
+        Simulated.
+    forced : bool
+        Whether what is left is the motion that the remedy itself makes, and no hunting.
+    stiction_factor : float
+        Largest factor on all breakaway friction that was tried and at which it still comes to rest; zero where it does
+        not come to rest, nan where that was not tried.
+    """
+
+    name: str
+    setting: str
+    predicted_error: float
+    hunting: Hunting
+    stiction_factor: float
+    forced: bool = False
+
+    @property
+    def does(self) -> str:
+        """The verdict, in words."""
+        return "follows the remedy" if self.forced else self.hunting.verdict
+
+    @property
+    def error(self) -> float:
+        """Largest error [rad] once the inputs have settled: the standing one, and that of a cycle."""
+        cycle = self.hunting.amplitude_rad if self.hunting.cycles else 0.0
+        return abs(self.hunting.standing_error_rad) + cycle
+
+    @property
+    def rank(self) -> tuple[float, ...]:
+        """What rests stands first, then by the error, the stiction factor and the heat; the undecided stands last."""
+        order = 0 if self.hunting.verdict == REST or self.forced else 1 if self.hunting.cycles else 2
+        error = math.inf if math.isnan(self.error) else self.error if self.error > NOTHING else 0.0
+        heat = self.hunting.wear.mean_loss
+        return order, error, -np.nan_to_num(self.stiction_factor), math.inf if math.isnan(heat) else heat
+
+
+@dataclass(frozen=True, kw_only=True)
+class RemedyTable:
+    """Remedies, the best first.
+
+    Attributes
+    ----------
+    before : Remedy
+        The actuator as it is.
+    ranked : tuple of Remedy
+        By `Remedy.rank`.
+    """
+
+    before: Remedy
+    ranked: tuple[Remedy, ...] = field(default_factory=tuple)
+
+    def table(self) -> str:
+        """One line per remedy: setting, verdict, error predicted and simulated, amplitude, heat, stiction factor."""
+        rows = [("remedy", "setting", "does", "error", "predicted", "amplitude", "loss", "stiction")]
+        rows += [("", "", "", "mrad", "mrad", "mrad", "W", "factor")]
+        rows += [cells(each) for each in (self.before, *self.ranked)]
+        widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+        left = 3  # columns of words
+        return "\n".join(
+            "  ".join(
+                f"{text:<{width}}" if k < left else f"{text:>{width}}"
+                for k, (text, width) in enumerate(zip(row, widths, strict=True))
+            )
+            for row in rows
+        )
+
+    def plot(self) -> "Figure":
+        """Error over heat of each remedy."""
+        from actuator.plots.diagnosis import plot_remedies
+
+        return plot_remedies(self)
+
+
+def cells(remedy: Remedy) -> tuple[str, ...]:
+    """A remedy as texts of a table: name, setting, verdict, errors and amplitude [mrad], loss [W], stiction factor."""
+    found = remedy.hunting
+    factor = "< 1" if remedy.stiction_factor == 0 else _number(remedy.stiction_factor)
+    if remedy.stiction_factor == LADDER[-1]:
+        factor = f">= {factor}"
+    return (
+        remedy.name,
+        remedy.setting,
+        remedy.does,
+        _number(1e3 * remedy.error if not remedy.error < NOTHING else 0.0),
+        "<= " + _number(1e3 * remedy.predicted_error) if math.isfinite(remedy.predicted_error) else "-",
+        _number(1e3 * found.amplitude_rad) if found.cycles else "-",
+        _number(found.wear.mean_loss),
+        factor,
+    )
+
+
+def _number(value: float) -> str:
+    return f"{value:.3g}" if math.isfinite(value) else "-"
+
+
+class RemedySearch:
+    """All remedies that suit the controller of an actuator that hunts, being tried.
+
+    Parameters
+    ----------
+    plant : Actuator
+        Of the run.
+    run : Run
+        It must end in a cycle (`classify` says so).
+    inputs, resolution
+        As they were for the run.
+    compiled : bool or None
+        As for `simulate`.
+    executor : Executor or None
+        Begins to run the remedies at once, side by side; None for one after another, in `finish`.
+
+    Raises
+    ------
+    ValueError
+        Where the run does not end in a cycle, or there is no controller.
+    """
+
+    def __init__(  # noqa: PLR0913 - what is simulated
+        self,
+        plant: Actuator,
+        run: Run,
+        *,
+        inputs: Mapping[str, Signal | float] | None = None,
+        resolution: float | None = None,
+        compiled: bool | None = None,
+        executor: Executor | None = None,
+    ) -> None:
+        self.hunting = classify(run)
+        if not self.hunting.cycles:
+            raise ValueError(f"{plant.name}: nothing to remedy: {self.hunting.verdict}, {self.hunting.reason}")
+        options = {"inputs": inputs, "resolution": resolution, "compiled": compiled}
+        # a fresh copy has no model yet, which could not be sent to another process
+        whole = float(run.t[-1])
+        # a motion that never stops is slow to simulate: as long as it takes to see the cycle that it should end
+        short = min(whole, float(trace_of(run).time[0]) + CYCLES * self.hunting.period_s)
+        work = [
+            (each._replace(plant=replace(each.plant)), whole if math.isnan(each.forced) else short, options)
+            for each in candidates(plant, run)
+        ]
+        self.count = len(work)
+        self._found = map(_tried, work) if executor is None else executor.map(_tried, work)
+
+    def finish(self, progress: Callable[[float], None] | None = None) -> RemedyTable:
+        """The table, once all are tried; `progress` is called with the share that is done."""
+        tried: list[Remedy] = []
+        for remedy in self._found:
+            tried.append(remedy)
+            if progress is not None:
+                progress(len(tried) / self.count)
+        before = Remedy(name="as it is", setting="", predicted_error=UNKNOWN, hunting=self.hunting, stiction_factor=0.0)
+        return RemedyTable(before=before, ranked=tuple(sorted(tried, key=lambda remedy: remedy.rank)))
+
+
+def find_remedies(plant: Actuator, run: Run, **options: Any) -> RemedyTable:
+    """Try every remedy that suits the controller on a run that ends in a cycle; arguments as of `RemedySearch`."""
+    return RemedySearch(plant, run, **options).finish()
+
+
+_built: dict[str, Actuator] = {}  # in each process: an actuator comes by value, and its model is to be built once
+
+
+def _tried(work: tuple[Candidate, float, dict[str, Any]]) -> Remedy:
+    candidate, duration, options = work
+    plant, parameters = _built.setdefault(repr(candidate.plant), candidate.plant), candidate.parameters
+    first = decide(plant, duration, parameters=parameters, **options).hunting
+    periods = first.period_s / candidate.forced
+    forced = bool(0.5 < periods < MOST_FORCED and abs(periods - round(periods)) < SAME * periods)  # noqa: PLR2004
+    factor = UNKNOWN if forced else 0.0  # for the same reason it is not tried
+    if first.verdict == REST:
+        factor = _stiction_factor(plant, parameters, duration, options)
+    return Remedy(
+        name=candidate.name,
+        setting=candidate.setting,
+        predicted_error=candidate.error,
+        hunting=first,
+        stiction_factor=factor,
+        forced=forced,
+    )
+
+
+def _stiction_factor(plant: Actuator, parameters: Mapping[str, float], duration: float, options: dict) -> float:
+    """The last rung of the ladder at which it rests, by bisection; it does on the first."""
+    values = {q.name: float(q.default) for q in plant.system().parameters} | dict(parameters)
+    low, high = 0, len(LADDER)
+    while high - low > 1:
+        middle = (low + high) // 2
+        more = {name: LADDER[middle] * value for name, value in values.items() if name.endswith(BREAKAWAY)}
+        run = simulate(plant, duration, parameters={**parameters, **more}, **options)
+        low, high = (middle, high) if classify(run).verdict == REST else (low, middle)
+    return LADDER[low]

@@ -1,1 +1,0 @@
-"""Does it hunt: verdicts, exact orbits, boundaries, rest, margins, causes and remedies."""

@@ -1,0 +1,1 @@
+"""Linear models with their derivatives by gains."""

@@ -1,0 +1,1 @@
+"""Margins and sensitivities of a loop."""

@@ -1,0 +1,1 @@
+"""Exact periodic orbits, continuous and sampled."""

@@ -1,0 +1,69 @@
+"""Exact periodic orbits, found from the cycle that a run ends in.
+
+The cycle is cut into segments of fixed modes, and Newton's method closes it.
+"""
+
+from collections.abc import Mapping
+
+from actuator.actuator import Actuator
+from actuator.orbits.find_sampled import find_sampled_orbit
+from actuator.orbits.flow import TOLERANCE, flow_map
+from actuator.orbits.one_period import find_return
+from actuator.orbits.orbit import Orbit
+from actuator.orbits.run_end import cycle_at_end
+from actuator.orbits.sampled import SampledOrbit
+from actuator.orbits.shooting import close
+from actuator.simulation.run import Run
+from actuator.system.hybrid import HybridSystem
+
+
+def find_orbit(
+    plant: Actuator | HybridSystem,
+    run: Run,
+    *,
+    inputs: Mapping[str, float] | None = None,
+    parameters: Mapping[str, float] | None = None,
+    segments: int = 1,
+    tolerance: float = TOLERANCE,
+    compiled: bool | None = None,
+) -> Orbit | SampledOrbit:
+    """The exact periodic orbit near the cycle that a run ends in.
+
+    Parameters
+    ----------
+    plant : Actuator or HybridSystem
+        The system of the run.
+    run : Run
+        It must end in a cycle (`classify` says so).
+    inputs, parameters : mapping of str to float
+        By name where they are to differ from those at the end of the run.
+    segments : int
+        Arcs into which the period is cut for multiple shooting, at its events; the result does not depend on it.
+        With sampled controllers only 1.
+    tolerance : float
+        Local error of each state over its nominal size; with sampled controllers it is that of `find_sampled_orbit`.
+    compiled : bool or None
+        As for `simulate`.
+
+    Returns
+    -------
+    Orbit or SampledOrbit
+        The latter for a system with clocks.
+
+    Raises
+    ------
+    ValueError
+        More arcs than the orbit has segments.
+    NoOrbit
+        Where the run does not end in a cycle, Newton's method does not close it, or its modes contradict the margins.
+    """
+    system = plant.system() if isinstance(plant, Actuator) else plant
+    if system.clocks:
+        if segments != 1:
+            raise ValueError(f"find_orbit: segments must be 1 for {system.name}, which is sampled, got {segments}")
+        return find_sampled_orbit(system, run, inputs=inputs, parameters=parameters, compiled=compiled)
+    period, u, p = cycle_at_end(system, run, inputs, parameters)
+    machine = flow_map(system, tolerance, compiled)
+    x, m = system.state_vector(run.state()), machine.words(run.mode_values[:, -1])
+    x, m = find_return(machine, x, m, u, p, period)
+    return close(machine, x, m, u, p, period, segments=segments)

@@ -1,0 +1,1 @@
+"""Pictures of results; the only room of this package that draws."""

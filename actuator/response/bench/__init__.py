@@ -1,0 +1,1 @@
+"""Bench tests: steps, triangles, staircases, holding, rate, heat, free play."""

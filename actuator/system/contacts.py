@@ -1,0 +1,308 @@
+"""The mechanics of a transmission as a hybrid automaton: margins, accelerations and the reset of its contacts."""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import casadi as ca
+
+from actuator.system.hybrid import MARGIN_BAND
+from gear.couplings import TWIST_NOMINAL, Twist
+from gear.elasticity import DEFLECTION_NOMINAL, has_gap
+from gear.kinematics import Kinematics
+from gear.motion import MeshMotion
+from gear.quantities import Scalar
+from gear.stiction import AT_LIMIT, BACKWARD, FORWARD, Matrix, RestProblem, decide, friction
+from gear.transmission import Contact, Transmission
+
+REST_SPEED = 10 * MARGIN_BAND  # part of a contact's usual slip speed that counts as standing still
+INACTIVE = 1.0  # value of a margin that means nothing in the present mode
+
+
+class ContactModes(NamedTuple):
+    """The mode variables of a transmission."""
+
+    motion: ca.SX  # (K, 1): 0 stuck, +-1 sliding, +-2 stuck at the limit
+    flank: dict[str, ca.SX]  # per mesh, coupling and end stop, by path: +1, -1, 0 in the gap
+
+
+class ContactForces(NamedTuple):
+    """All that the contacts of a transmission do at one state; vectors are (K, 1) in the order of the contacts."""
+
+    motions: dict[str, MeshMotion]  # per mesh
+    normal: dict[str, Matrix]  # signed normal force per mesh [N]
+    twists: dict[str, Twist]  # per coupling and end stop, by path
+    passed: dict[str, Matrix]  # torque passed per coupling and end stop [N m], by path
+    slip: Matrix  # slip speed
+    static: Matrix  # friction limit at rest
+    sliding: Matrix  # friction while sliding at the present speed
+    compliance: Matrix  # G of the joint decision
+    demand: Matrix  # slip acceleration without contact friction
+    friction: Matrix  # the friction scalars of the present modes
+    acceleration: dict[str, Matrix]  # per shaft [rad/s^2]
+
+
+class ContactMechanics:
+    """The contacts of one transmission, with inertias and torques of what is attached to it.
+
+    Parameters
+    ----------
+    gear : Transmission
+        Symbolic (its numbers are parameters).
+    redundant : bool
+        Whether several contacts can lock the same shafts.
+    kinematics : Kinematics
+        Which shafts move independently.
+    inertia : mapping of str to SX
+        Total inertia per shaft; it may depend on the angles.
+    """
+
+    def __init__(
+        self, gear: Transmission, redundant: bool, kinematics: Kinematics, inertia: Mapping[str, Scalar]
+    ) -> None:
+        self.gear, self.redundant, self.kinematics = gear, redundant, kinematics
+        self.masses, self.inertia = inertia, kinematics.solver(inertia)
+        self.contacts: list[Contact] = gear.contacts()
+        # without a gap the flank only matters to friction, where the size of the normal force has a kink
+        laws = {name: mesh.law() for name, mesh in gear.meshes.items() if not mesh.rigid}
+        self.laws = {
+            f"meshes.{name}": law
+            for name, law in laws.items()
+            if has_gap(law) or gear.meshes[name].friction is not None
+        }
+        still = Twist(0.0, 0.0)
+        self.plays = {path: part for path, part in gear.springs().items() if part.penetration(still, 1.0) is not None}
+        self.gapped = [path for path, law in self.laws.items() if has_gap(law)] + [*self.plays]
+        self.flanks = [*self.laws, *self.plays]
+
+    def mode_names(self) -> list[str]:
+        """Names of the mode variables: a motion per contact, a flank per mesh, coupling with a gap and end stop."""
+        motions = [f"gear.{contact.name}.motion" for contact in self.contacts]
+        return motions + [f"gear.{path}.flank" for path in self.flanks]
+
+    def modes(self, m: ca.SX) -> ContactModes:
+        """The mode variables from the vector m; rounding is taken off here, once."""
+        whole = [ca.sign(m[k]) * ((ca.fabs(m[k]) > 0.5) + (ca.fabs(m[k]) > 1.5)) for k in range(m.shape[0])]  # noqa: PLR2004
+        count = len(self.contacts)
+        return ContactModes(ca.vertcat(*whole[:count]), self._all_flanks(whole[count:]))
+
+    def _all_flanks(self, flanks: Sequence[ca.SX]) -> dict[str, ca.SX]:
+        """Flanks by path; +1 where a mesh or coupling has only one."""
+        paths = [*(f"meshes.{name}" for name in self.gear.meshes), *self.gear.springs()]
+        return dict.fromkeys(paths, ca.SX(1)) | dict(zip(self.flanks, flanks, strict=True))
+
+    def slip_speeds(self, speed: Mapping[str, Scalar]) -> Matrix:
+        """Slip speed of each contact."""
+        return ca.vertcat(*(sum(c * speed[shaft] for shaft, c in contact.slip.items()) for contact in self.contacts))
+
+    def forces(self, angle: Mapping, speed: Mapping, torque: Mapping, modes: ContactModes) -> ContactForces:
+        """Friction and accelerations in the given modes, with `torque` per shaft from outside."""
+        direction = ca.sign(modes.motion)
+        slip = self.slip_speeds(speed)
+        motions = self.gear.motions(angle, speed)
+        normal = self.gear.normal_forces(motions, modes.flank)
+        twists = self.gear.twists(angle, speed)
+        passed = self.gear.passed_torques(twists, modes.flank)
+        smooth = self.gear.torques(speed, normal, passed)
+        free = self.inertia.accelerations({shaft: value + torque.get(shaft, 0) for shaft, value in smooth.items()})
+        demand = ca.vertcat(*(sum(c * free[shaft] for shaft, c in contact.slip.items()) for contact in self.contacts))
+        compliance = self.compliance()
+        static, sliding = self.limits(motions, normal, direction * slip, direction, modes)
+        at_limit = ca.eq(ca.fabs(modes.motion), AT_LIMIT)
+        given = direction * ca.if_else(at_limit, static, sliding)
+        held = ca.eq(direction, 0) * self._engaged(modes)
+        scalar = friction(compliance, demand, held, given, self.redundant)
+        answer = self.inertia.accelerations(self.friction_torques(scalar))
+        acceleration = {shaft: free[shaft] + answer[shaft] for shaft in self.gear.shafts}
+        return ContactForces(
+            motions, normal, twists, passed, slip, static, sliding, compliance, demand, scalar, acceleration
+        )
+
+    def compliance(self) -> Matrix:
+        """G of the joint decision: slip acceleration of contact i per unit of friction against it in contact k."""
+        count = len(self.contacts)
+        matrix = ca.SX(count, count)
+        for k, column in enumerate(self.contacts):
+            answer = self.inertia.accelerations(column.torque)
+            for i, row in enumerate(self.contacts):
+                taken = ca.SX(sum(c * answer[shaft] for shaft, c in row.slip.items()))
+                if not taken.is_zero():
+                    matrix[i, k] = -taken
+        return matrix
+
+    def rigid_forces(self, forces: ContactForces, angle: Mapping, speed: Mapping, torque: Mapping) -> dict[str, Scalar]:
+        """Normal force [N] of each rigid mesh: what keeps its constraint, with the modes' friction acting.
+
+        With R the constraints and J the inertias of the shafts, R J^-1 R^T lambda = R J^-1 torque.
+        """
+        rigid = [name for name, mesh in self.gear.meshes.items() if mesh.rigid]
+        rows = [self.gear.meshes[name].deflection_per_shaft() for name in rigid] + [{s: 1.0} for s in self.gear.fixed]
+        if not rigid:
+            return {}
+        smooth, stuck = self.gear.torques(speed, forces.normal, forces.passed), self.friction_torques(forces.friction)
+        free = {s: (smooth[s] + stuck[s] + torque.get(s, 0)) / self.masses[s] for s in self.gear.shafts}
+        compliance, demand = ca.SX(len(rows), len(rows)), ca.SX(len(rows), 1)
+        for i, row in enumerate(rows):
+            demand[i] = sum(c * free[s] for s, c in row.items())
+            for k, other in enumerate(rows):
+                compliance[i, k] = sum(c * other[s] / self.masses[s] for s, c in row.items() if s in other)
+        kept = friction(compliance, demand, ca.SX.ones(len(rows)), ca.SX.zeros(len(rows)), redundant=True)
+        return {name: kept[k] / ca.cos(self.gear.meshes[name].pair.working_angle) for k, name in enumerate(rigid)}
+
+    def friction_torques(self, scalar: Matrix) -> dict[str, Scalar]:
+        """Torque on each shaft from the friction scalars."""
+        return {
+            shaft: sum((c.torque[shaft] * scalar[k] for k, c in enumerate(self.contacts) if shaft in c.torque), 0.0)
+            for shaft in self.gear.shafts
+        }
+
+    def limits(
+        self, motions: Mapping, normal: Mapping, speed: Matrix, direction: Matrix, modes: ContactModes
+    ) -> tuple[Matrix, Matrix]:
+        """Friction limits at rest and while sliding at `speed` >= 0 in `direction`; zero in a gap."""
+        names = [contact.name for contact in self.contacts]
+        slip = {name: ca.fmax(speed[k], 0) for k, name in enumerate(names)}
+        pairs = self.gear.friction_limits(motions, normal, slip, {name: direction[k] for k, name in enumerate(names)})
+        engaged = self._engaged(modes)
+        static, sliding = (ca.vertcat(*(pairs[contact.name][j] for contact in self.contacts)) for j in (0, 1))
+        return engaged * static, engaged * sliding
+
+    def _engaged(self, modes: ContactModes) -> Matrix:
+        """1 per contact, 0 for a mesh in its gap."""
+        return ca.vertcat(
+            *(ca.fabs(modes.flank[contact.name]) if contact.name in modes.flank else 1 for contact in self.contacts)
+        )
+
+    # -- margins --------------------------------------------------------------------------------------
+
+    def margin_names(self) -> list[str]:
+        """Two margins per contact, two per mesh, coupling or stop with a gap and one per mesh without."""
+        names = [f"gear.{contact.name} {end}" for contact in self.contacts for end in ("upper", "lower")]
+        for path in self.flanks:
+            sides = ("flank +", "flank -") if path in self.gapped else ("flank",)
+            names += [f"gear.{path} {side}" for side in sides]
+        return names
+
+    def _beyond(self, path: str, motions: Mapping, twists: Mapping, side: int) -> Scalar:
+        """How far teeth or coupling are beyond their gap on a side, over a usual size."""
+        if path in self.plays:
+            return self.plays[path].penetration(twists[path], side) / TWIST_NOMINAL
+        return self.laws[path].penetration(motions[path.removeprefix("meshes.")], side) / DEFLECTION_NOMINAL
+
+    def margins(self, forces: ContactForces, modes: ContactModes) -> Matrix:
+        """Margins in the order of `margin_names`.
+
+        stuck:    (static - s) and (static + s), over a usual friction force
+        sliding:  direction * slip speed, over a usual speed
+        flank:    flank * F_n without a gap, else the penetration or the distance to the flank
+        """
+        rows = []
+        engaged = self._engaged(modes)
+        for k, contact in enumerate(self.contacts):
+            stuck = ca.logic_and(ca.eq(modes.motion[k], 0), engaged[k])
+            slides = ca.logic_and(ca.eq(ca.fabs(modes.motion[k]), 1), engaged[k])
+            speed = modes.motion[k] * forces.slip[k] / contact.speed_nominal
+            room = [(forces.static[k] - end * forces.friction[k]) / contact.force_nominal for end in (1, -1)]
+            rows += [
+                ca.if_else(stuck, room[0], ca.if_else(slides, speed, INACTIVE)),
+                ca.if_else(stuck, room[1], INACTIVE),
+            ]
+        for path in self.flanks:
+            flank = modes.flank[path]
+            if path not in self.gapped:
+                name = path.removeprefix("meshes.")
+                usual = self.laws[path].nominal_force() * self.gear.meshes[name].count
+                rows.append(flank * forces.normal[name] / usual)
+                continue
+            for side in (1, -1):
+                beyond = self._beyond(path, forces.motions, forces.twists, side)
+                rows.append(ca.if_else(ca.eq(flank, side), beyond, ca.if_else(ca.eq(flank, 0), -beyond, INACTIVE)))
+        return ca.vertcat(*rows) + MARGIN_BAND
+
+    # -- reset ----------------------------------------------------------------------------------------
+
+    def flanks_after(self, fired: Matrix, angle: Mapping, speed: Mapping, before: Mapping[str, Scalar]) -> list[ca.SX]:
+        """Flank of each mesh, coupling and stop after an event; from where it is if the event was elsewhere."""
+        motions, twists = self.gear.motions(angle, speed), self.gear.twists(angle, speed)
+        row, found = 2 * len(self.contacts), []
+        for path in self.flanks:
+            flank = before[path]
+            if path not in self.gapped:
+                force = self.laws[path].force(motions[path.removeprefix("meshes.")], flank)
+                kept = ca.if_else(ca.fabs(force) > 0, ca.sign(force), 1)
+                turned = ca.if_else(ca.eq(flank, 0), kept, -flank)
+                found.append(ca.if_else(fired[row], turned, kept))
+                row += 1
+                continue
+            deep = [self._beyond(path, motions, twists, side) > 0 for side in (1, -1)]
+            sides = ca.if_else(deep[0], 1, ca.if_else(deep[1], -1, 0))
+            # the flank that fired: engaged if it was in the gap, in the gap if it was engaged
+            plus = ca.if_else(ca.eq(flank, 0), 1, 0)
+            minus = ca.if_else(ca.eq(flank, 0), -1, 0)
+            found.append(ca.if_else(fired[row], plus, ca.if_else(fired[row + 1], minus, sides)))
+            row += 2
+        return found
+
+    def problem(
+        self, fired: Matrix, angle: Mapping, speed: Mapping, torque: Mapping, before: Matrix, flank: Mapping
+    ) -> RestProblem:
+        """What is to be decided jointly after an event: which contacts are at rest, and what they must bear."""
+        slip = self.slip_speeds(speed)
+        direction = ca.sign(slip)
+        modes = ContactModes(direction, dict(flank))
+        forces = self.forces(angle, speed, torque, modes)
+        rest, released = [], []
+        for k, contact in enumerate(self.contacts):
+            hit = ca.logic_or(fired[2 * k], fired[2 * k + 1])
+            was_stuck = ca.eq(before[k], 0)
+            slow = ca.fabs(slip[k]) <= REST_SPEED * contact.speed_nominal
+            rest.append(ca.logic_or(slow, hit))
+            released.append(ca.logic_and(hit, was_stuck))
+        resting = ca.vertcat(*rest) * self._engaged(modes)
+        still = ca.SX.zeros(len(self.contacts))
+        onset = [
+            self.limits(forces.motions, forces.normal, still, still + end, modes)[1] for end in (FORWARD, BACKWARD)
+        ]
+        return RestProblem(
+            compliance=forces.compliance,
+            demand=forces.demand,
+            static=forces.static,
+            forward=onset[0],
+            backward=onset[1],
+            rest=resting,
+            given=direction * forces.sliding,
+            released=ca.vertcat(*released),
+        )
+
+    def reset_function(
+        self,
+        name: str,
+        arguments: list[ca.SX],
+        fired: Matrix,
+        angle: Mapping,
+        speed: Mapping,
+        torque: Mapping,
+        m: ca.SX,
+    ) -> ca.Function:
+        """(fired, *arguments) -> speeds after, modes after, fault; all modes decided together.
+
+        Contacts at rest get their slip speed set to exactly zero by an impulse along their own friction.
+        """
+        before = self.modes(m)
+        flank = self.flanks_after(fired, angle, speed, before.flank)
+        problem = self.problem(fired, angle, speed, torque, before.motion, self._all_flanks(flank))
+        impulse = friction(
+            problem.compliance, self.slip_speeds(speed), problem.rest, ca.SX.zeros(len(self.contacts)), self.redundant
+        )
+        step = self.inertia.accelerations(self.friction_torques(impulse))
+        speeds = [speed[shaft] + step[shaft] for shaft in self.kinematics.independent]
+        pose = ca.Function(
+            f"{name}_pose",
+            [fired, *arguments],
+            [*problem, ca.sign(self.slip_speeds(speed)), ca.vertcat(*flank), ca.vertcat(*speeds)],
+        )
+        inputs = [ca.MX.sym(f"input{i}", symbol.shape[0]) for i, symbol in enumerate((fired, *arguments))]
+        *posed, direction, flanks, after = pose(*inputs)
+        posed = RestProblem(*posed)
+        decision = decide(posed, self.redundant)
+        motion = ca.if_else(posed.rest, decision.motion, direction)
+        return ca.Function(name, inputs, [after, ca.vertcat(motion, flanks), decision.fault])

@@ -1,0 +1,1 @@
+"""Does it hunt? The verdict on a run or on a measured log."""

@@ -1,0 +1,221 @@
+"""Monte Carlo over tolerances: how probable is hunting, how probable a missed demand, and which parameters matter.
+
+Points are those of Saltelli's scheme, whose first two blocks are random and independent and give the probabilities; all
+blocks together give Sobol' indices of a continuous measure (the amplitude of the cycle, the gain at the bandwidth).
+
+References
+----------
+E. B. Wilson, "Probable inference, the law of succession, and statistical inference", J. Am. Stat. Assoc. 22 (1927);
+A. Saltelli et al., "Variance based sensitivity analysis of model output", Comput. Phys. Commun. 181 (2010).
+"""
+
+import math
+from collections.abc import Callable, Mapping, MutableMapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from statistics import NormalDist
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from actuator.stiction.margins import sliding_of
+from studies.kept import fingerprint
+from studies.specification import Tolerance, matching
+
+TAILS = 1e-3  # of a normal distribution, on each side, that are left out: three sigma
+CONFIDENCE = 0.95
+
+
+class MissingLibrary(ImportError):
+    """SALib is not installed."""
+
+
+class Probability(NamedTuple):
+    """How often something happened, and between which probabilities it lies by Wilson's score."""
+
+    happened: int
+    trials: int
+    low: float
+    high: float
+
+    @property
+    def value(self) -> float:
+        """The share."""
+        return self.happened / self.trials
+
+
+class Influence(NamedTuple):
+    """Share of the variance of a measure that a parameter has: alone, and with all its interactions; half widths."""
+
+    parameter: str
+    alone: float
+    total: float
+    alone_within: float
+    total_within: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Robustness:
+    """What tolerances do.
+
+    Attributes
+    ----------
+    probabilities : dict of str to Probability
+        By the name of what is missed.
+    influences : dict of str to tuple of Influence
+        By the name of the measure, the most influential parameter first.
+    points : tuple of dict
+        Factors of every point.
+    results : tuple of dict
+        What came of it.
+    """
+
+    probabilities: dict[str, Probability]
+    influences: dict[str, tuple[Influence, ...]]
+    points: tuple[dict[str, float], ...] = field(repr=False)
+    results: tuple[dict[str, Any], ...] = field(repr=False)
+
+
+def wilson(happened: int, trials: int, confidence: float = CONFIDENCE) -> Probability:
+    """Wilson's interval of a probability.
+
+        (h + z^2/2)/(n + z^2) -+ z/(n + z^2) sqrt(h (n - h)/n + z^2/4)
+
+    Raises
+    ------
+    ValueError
+        Unless 0 <= happened <= trials and trials > 0.
+    """
+    if not 0 <= happened <= trials or trials == 0:
+        raise ValueError(f"wilson needs 0 <= happened <= trials and trials > 0, got {happened} of {trials}")
+    z = NormalDist().inv_cdf((1 + confidence) / 2)
+    middle = (happened + z**2 / 2) / (trials + z**2)
+    half = z / (trials + z**2) * math.sqrt(happened * (trials - happened) / trials + z**2 / 4)
+    # the interval of nothing starts at zero; rounding would have it start beside it
+    return Probability(
+        happened, trials, 0.0 if happened == 0 else middle - half, 1.0 if happened == trials else middle + half
+    )
+
+
+def factors(shares: np.ndarray, tolerances: Sequence[Tolerance]) -> np.ndarray:
+    """Factors on the parameters from shares between 0 and 1, (points, tolerances) both."""
+    found = np.empty_like(shares)
+    for k, tolerance in enumerate(tolerances):
+        if tolerance.spread == "uniform":
+            found[:, k] = 1 + tolerance.size * (2 * shares[:, k] - 1)
+        else:
+            normal = NormalDist(1.0, tolerance.size)
+            found[:, k] = [normal.inv_cdf(TAILS + (1 - 2 * TAILS) * share) for share in shares[:, k]]
+    return found
+
+
+def spread(values: Mapping[str, float], tolerances: Sequence[Tolerance], row: Sequence[float]) -> dict[str, float]:
+    """Parameters that differ, from nominal values and factors; breakaway friction is never below sliding friction."""
+    found: dict[str, float] = {}
+    for tolerance, factor in zip(tolerances, row, strict=True):
+        for name in matching(tolerance.parameter, values):
+            found[name] = factor * found.get(name, values[name])
+    now = {**values, **found}
+    for name in values:
+        other = sliding_of(name, values)
+        if other is not None and (name in found or other in found):
+            found[name] = max(now[name], now[other])
+    return found
+
+
+def robustness(  # noqa: PLR0913 - the study, and how it is run
+    work: Callable[[dict[str, float]], dict[str, Any]],
+    nominal: Mapping[str, float],
+    tolerances: Sequence[Tolerance],
+    *,
+    events: Mapping[str, Callable[[Mapping[str, Any]], bool]],
+    measures: Sequence[str],
+    about: str = "",
+    base: int = 32,
+    seed: int = 1,
+    done: MutableMapping[str, dict[str, Any]] | None = None,
+    workers: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Robustness:
+    """Probabilities of events, and what they depend on.
+
+    Parameters
+    ----------
+    work : callable
+        From parameters to a dictionary of numbers and words; it must go through pickle where processes do not fork.
+    nominal : mapping of str to float
+        Parameters by name.
+    tolerances : sequence of Tolerance
+        How they spread.
+    events : mapping of str to callable
+        Whether something has happened, from a result.
+    measures : sequence of str
+        Keys of the numbers in a result whose variance is traced back.
+    about : str
+        All that results depend on besides the parameters: those kept under another one are not used.
+    base : int
+        Points of one block, a power of two; tolerances + 2 blocks are run, 2 base points give the probabilities.
+    seed : int
+        Of the random points.
+    done, workers, progress
+        As for `sweep`.
+
+    Raises
+    ------
+    MissingLibrary
+        Without SALib.
+    ValueError
+        Without tolerances, or with a base that is no power of two.
+    """
+    from actuator.simulation.sweep import sweep
+
+    if not tolerances:
+        raise ValueError("robustness needs at least one tolerance: add [[tolerances]] to the specification")
+    if base < 2 or base & (base - 1):  # noqa: PLR2004 - Sobol' points fill the space in powers of two
+        raise ValueError(f"robustness: base must be a power of two, got {base}")
+    names = [tolerance.parameter for tolerance in tolerances]
+    sample, influences_of = _scheme(names, seed)
+    rows = factors(sample(base), tolerances)
+    sets = [{**nominal, **spread(nominal, tolerances, row.tolist())} for row in rows]
+    keys = [fingerprint([about, values]) for values in sets]
+    found = sweep(work, dict(zip(keys, sets, strict=True)), done=done, workers=workers, progress=progress)
+    results = [found[key] for key in keys]
+    block = len(names) + 2
+    independent = [result for k, result in enumerate(results) if k % block in (0, block - 1)]  # A and B of the scheme
+    probabilities = {
+        name: wilson(sum(bool(happens(result)) for result in independent), len(independent))
+        for name, happens in events.items()
+    }
+    return Robustness(
+        probabilities=probabilities,
+        influences={name: influences_of(np.array([float(result[name]) for result in results])) for name in measures},
+        points=tuple(dict(zip(names, row.tolist(), strict=True)) for row in rows),
+        results=tuple(results),
+    )
+
+
+def _scheme(
+    names: Sequence[str], seed: int
+) -> tuple[Callable[[int], np.ndarray], Callable[[np.ndarray], tuple[Influence, ...]]]:
+    """Saltelli's: shares between 0 and 1 from the points of a block, and influences from a measure at all points."""
+    try:
+        from SALib.analyze import sobol as analysis
+        from SALib.sample import sobol as sampling
+    except ImportError:
+        raise MissingLibrary(
+            "robustness needs SALib for its sensitivities; install it with: pip install 'geared-actuator[robustness]'"
+        ) from None
+    problem = {"num_vars": len(names), "names": list(names), "bounds": [[0.0, 1.0]] * len(names)}
+    sample = partial(sampling.sample, problem, calc_second_order=False, scramble=True, seed=seed)
+    analyze = partial(analysis.analyze, problem, calc_second_order=False, seed=seed)
+    return sample, partial(_influences, names, analyze)
+
+
+def _influences(names: Sequence[str], analyze: Callable[..., Any], values: np.ndarray) -> tuple[Influence, ...]:
+    """Sobol' indices; all zero where nothing varies."""
+    if np.ptp(values) <= 1e-12 * abs(values).max(initial=0.0):
+        return tuple(Influence(name, 0.0, 0.0, 0.0, 0.0) for name in names)
+    found = analyze(values)
+    each = zip(names, found["S1"], found["ST"], found["S1_conf"], found["ST_conf"], strict=True)
+    rows = [Influence(name, *(float(number) for number in numbers)) for name, *numbers in each]
+    return tuple(sorted(rows, key=lambda row: -row.total))

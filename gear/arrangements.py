@@ -6,10 +6,10 @@ project knows these sets. For planets that are lumped here and can be taken apar
 
 from collections.abc import Mapping, Sequence
 
-from gear.geometry import ExternalPair, GivenPair
-from gear.internal import InternalPair
 from gear.planets import RIGID, MeshLaws, Planets
 from gear.shafts import Bearing, Shaft
+from gear.teeth.geometry import ExternalPair, GivenPair
+from gear.teeth.internal import InternalPair
 from gear.transmission import Transmission
 
 CENTERS = 1e-6  # relative difference up to which two center distances are the same

@@ -5,7 +5,7 @@ from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Unit
 
-from gear.elastic_law import pushing
+from gear.elasticity.law import pushing
 from gear.quantities import Angle, Scalar, TorsionalDamping, TorsionalStiffness, check, show
 
 TWIST_NOMINAL = 1e-4  # rad; couplings under load twist by about this

@@ -3,9 +3,9 @@
 from typing import TYPE_CHECKING
 
 from gear.balance import balance
-from gear.geometry import GivenPair
 from gear.mesh import Mesh
-from gear.screw import ScrewPair
+from gear.teeth.geometry import GivenPair
+from gear.teeth.screw import ScrewPair
 from gear.transmission import Transmission
 
 if TYPE_CHECKING:

@@ -6,13 +6,13 @@ from typing import Literal, NamedTuple
 
 import casadi as ca
 
-from gear.elasticity import ElasticityLaw, ElasticityLaws, as_law
-from gear.friction import FrictionLaws, require_suited
-from gear.geometry import ExternalPair, GivenPair
-from gear.internal import InternalPair
+from gear.elasticity.laws import ElasticityLaw, ElasticityLaws, as_law
+from gear.friction.law import FrictionLaws, require_suited
 from gear.motion import MeshMotion
 from gear.quantities import Scalar, check_count, show
-from gear.screw import ScrewPair
+from gear.teeth.geometry import ExternalPair, GivenPair
+from gear.teeth.internal import InternalPair
+from gear.teeth.screw import ScrewPair
 
 MESH_SPEED_NOMINAL = 1e-2  # m/s
 

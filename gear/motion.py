@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-from gear.geometry import Pair
 from gear.quantities import Scalar
+from gear.teeth.geometry import Pair
 
 
 class MeshMotion(NamedTuple):

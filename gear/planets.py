@@ -10,8 +10,8 @@ from typing import Annotated, Literal
 
 from annotated_types import Ge, Unit
 
-from gear.elasticity import ElasticityLaws
-from gear.friction import FrictionLaws
+from gear.elasticity.laws import ElasticityLaws
+from gear.friction.law import FrictionLaws
 from gear.mesh import Mesh
 from gear.quantities import Inertia, check, check_count
 from gear.shafts import Shaft

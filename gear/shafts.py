@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from itertools import pairwise
 
-from gear.oil_drag import Palmgren, Thickening
+from gear.friction.tables import piecewise_linear
+from gear.lubrication.drag import Palmgren, Thickening
 from gear.quantities import Distance, FrictionTorque, Inertia, Scalar, TorsionalDamping, check, show
-from gear.tables import piecewise_linear
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,9 +7,9 @@ import numpy as np
 from hypothesis import reject
 from hypothesis import strategies as st
 
-from gear.elastic_law import AT_REST
-from gear.geometry import ExternalPair
+from gear.elasticity.law import AT_REST
 from gear.motion import Sliding
+from gear.teeth.geometry import ExternalPair
 
 PAPER_PAIR = ExternalPair(teeth_a=20, teeth_b=60, module=1e-3)  # 10/30 mm, tips 11/31 mm: van der Linden, Table 3
 

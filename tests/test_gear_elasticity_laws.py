@@ -35,7 +35,7 @@ from gear import (
     TransmissionError,
     elasticity_curves,
 )
-from gear.elasticity import as_law, has_gap
+from gear.elasticity.laws import as_law, has_gap
 from gear.motion import MeshMotion
 from studies.converter import converter
 

@@ -35,7 +35,7 @@ from gear import (
     TabulatedEfficiency,
     Transmission,
 )
-from gear.din3990 import reduced_radius
+from gear.friction.din3990 import reduced_radius
 from gear.motion import Sliding
 from studies.checks.paper import figure_9, figure_9_inputs, figure_9_start
 from studies.converter import converter

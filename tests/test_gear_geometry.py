@@ -12,8 +12,8 @@ from scipy.optimize import brentq
 from tooth_oracles import averages, by_symbols, cut_external_pairs, cut_pairs, plane, turned_round
 
 from gear import Mesh
-from gear.geometry import ExternalPair, GivenPair
-from gear.involute import Rack, Teeth, gearing
+from gear.teeth.geometry import ExternalPair, GivenPair
+from gear.teeth.involute import Rack, Teeth, gearing
 
 STANDARD = {"teeth_a": 20, "teeth_b": 60, "module": 1e-3}
 

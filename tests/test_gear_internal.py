@@ -12,8 +12,8 @@ from oracles import numbers, signs
 from tooth_oracles import RING, averages, by_symbols, internal_pairs, plane, tip_gap, turned_round
 
 from gear import Coulomb, ExternalPair, GivenPair, InternalPair, Linear, Mesh, Shaft, Transmission
-from gear.involute import Rack, Teeth, gearing
-from gear.tooth_checks import require_possible
+from gear.teeth.checks import require_possible
+from gear.teeth.involute import Rack, Teeth, gearing
 from studies.converter import converter
 
 TEETH = Linear(stiffness=2e8, damping=0.0)

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from oracles import gradient_in_symbols, in_symbols, numbers, pressed, rubbing, signs
 
 from gear import Backlash, Coulomb, Linear
-from gear.elasticity import Gapless, has_gap
+from gear.elasticity.laws import Gapless, has_gap
 
 TEETH = Linear(stiffness=2e8, damping=2e5)  # van der Linden, section 4.1
 GAP = 15e-6  # m, total: van der Linden, Table 3

@@ -9,7 +9,7 @@ from oracles import gradient_in_symbols, in_symbols, numbers
 from scipy.optimize import fsolve
 
 from gear import GivenViscosity, KnownOil, Oil, OilAt, Vogel, Walther
-from gear.lubricant import MOBIL_JET_OIL_II, OILS, PENNZANE_X2000, XC_5606J
+from gear.lubrication.lubricant import MOBIL_JET_OIL_II, OILS, PENNZANE_X2000, XC_5606J
 
 CELSIUS, MM2 = 273.15, 1e-6
 COLD, ROOM, WARM = (CELSIUS + temperature for temperature in (-55, 20, 70))

@@ -12,8 +12,8 @@ from hypothesis.extra.numpy import arrays
 from oracles import numbers
 from scipy.optimize import linprog
 
-from gear.geometry import ExternalPair
 from gear.stiction import AT_LIMIT, STUCK, RestProblem, decide, friction
+from gear.teeth.geometry import ExternalPair
 
 NEAR = 1e-9  # rounding left by the solutions of well-conditioned problems of this size
 ELSEWHERE = None  # entry of a combination for a contact that is not at rest

@@ -10,9 +10,9 @@ from hypothesis import reject
 from hypothesis import strategies as st
 from oracles import numbers
 
-from gear.geometry import ExternalPair
-from gear.internal import InternalPair
 from gear.quantities import unit_of
+from gear.teeth.geometry import ExternalPair
+from gear.teeth.internal import InternalPair
 
 RING = InternalPair(teeth_a=20, teeth_b=60, module=1e-3, tip_radius_a=11e-3, tip_radius_b=29.25e-3)
 

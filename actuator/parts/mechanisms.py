@@ -1,6 +1,6 @@
 """Mechanisms between a shaft and a rod: travel as a function of the shaft's angle, with its first two derivatives.
 
-All are without losses; for the friction of a screw see `gear.screw.ScrewPair`.
+All are without losses; for the friction of a screw see `gear.teeth.screw.ScrewPair`.
 """
 
 import math

@@ -15,7 +15,7 @@ from actuator.actuator import Actuator
 from actuator.response.sine import SinePoint, SineResponse, SineStream
 from actuator.simulation.sweep import sweep
 from actuator.system.hybrid import HybridSystem
-from gear.lubricant import at_temperature
+from gear.lubrication.lubricant import at_temperature
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,7 +7,7 @@ import casadi as ca
 
 from actuator.system.hybrid import MARGIN_BAND
 from gear.couplings import TWIST_NOMINAL, Twist
-from gear.elasticity import DEFLECTION_NOMINAL, has_gap
+from gear.elasticity.laws import DEFLECTION_NOMINAL, has_gap
 from gear.kinematics import Kinematics
 from gear.motion import MeshMotion
 from gear.quantities import Scalar

@@ -9,7 +9,7 @@ from actuator.parts.temperature import MotorTemperature
 from actuator.parts.thermal import ThermalNetwork
 from actuator.system.builder import Ledger
 from actuator.system.parameters import substituted, unchecked
-from gear.lubricant import MEASURED, OilAt
+from gear.lubrication.lubricant import MEASURED, OilAt
 from gear.quantities import Scalar
 
 WARM = 1.0  # K, a usual change

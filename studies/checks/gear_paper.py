@@ -34,9 +34,9 @@ from gear import (
 from gear.balance import balance
 from gear.breakout import breakout
 from gear.efficiency import efficiency
-from gear.elastic_law import AT_REST
+from gear.elasticity.law import AT_REST
+from gear.friction.tabulated_efficiency import EfficiencyPoint
 from gear.motion import Sliding
-from gear.tabulated_efficiency import EfficiencyPoint
 from studies.checks.paper import figure_9, figure_9_inputs, figure_9_start
 from studies.findings import Findings, png
 from studies.stages import Stages

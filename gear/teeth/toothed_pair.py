@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
-from gear.involute import Gearing, Path, Rack, Teeth, gearing
 from gear.quantities import Factor, HelixAngle, Length, Number, PressureAngle, Scalar, check
-from gear.tooth_checks import require_possible, require_teeth
+from gear.teeth.checks import require_possible, require_teeth
+from gear.teeth.involute import Gearing, Path, Rack, Teeth, gearing
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass
 
-from gear.backlash import Backlash, BacklashAsPrinted, Teeth
-from gear.elastic_law import as_law
-from gear.geometry import Pair
+from gear.elasticity.backlash import Backlash, BacklashAsPrinted, Teeth
+from gear.elasticity.law import as_law
 from gear.harmonics import Harmonic, lowest_factor, pitch_of, tooth_factor
 from gear.motion import MeshMotion
 from gear.quantities import Length, Scalar, check
+from gear.teeth.geometry import Pair
 
 SOFTEST = 0.01  # factor; teeth in contact are never that soft, and zero would leave them without a force
 

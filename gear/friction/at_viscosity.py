@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass
 
-from gear.lubricant import Lubricants
+from gear.friction.over_speed import FrictionTable, Stribeck
+from gear.friction.tabulated_efficiency import TabulatedEfficiency
+from gear.lubrication.lubricant import Lubricants
 from gear.motion import Sliding
 from gear.quantities import Scalar
-from gear.tabulated_efficiency import TabulatedEfficiency
-from gear.velocity_friction import FrictionTable, Stribeck
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,15 +2,15 @@
 
 from dataclasses import dataclass
 
-from gear.coulomb import Coulomb
-from gear.din3990 import Din3990
-from gear.geometry import Pair
+from gear.friction.at_viscosity import AtViscosity
+from gear.friction.coulomb import Coulomb
+from gear.friction.din3990 import Din3990
+from gear.friction.over_speed import FrictionTable, Stribeck
+from gear.friction.tabulated_efficiency import TabulatedEfficiency
 from gear.harmonics import Harmonic, lowest_factor, pitch_of, tooth_factor
 from gear.motion import Sliding
 from gear.quantities import Length, Scalar, check
-from gear.tabulated_efficiency import TabulatedEfficiency
-from gear.velocity_friction import FrictionTable, Stribeck
-from gear.viscosity_friction import AtViscosity
+from gear.teeth.geometry import Pair
 
 UniformFriction = Coulomb | Din3990 | TabulatedEfficiency | Stribeck | FrictionTable | AtViscosity
 

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from gear.geometry import Pair
+from gear.friction.speed_axis import require_axis
+from gear.friction.tables import piecewise_linear
 from gear.motion import Sliding
 from gear.quantities import AtLeastOne, MeshSpeed, Scalar, Share, check
-from gear.speed_axis import require_axis
-from gear.tables import piecewise_linear
+from gear.teeth.geometry import Pair
 
 
 @dataclass(frozen=True, kw_only=True)

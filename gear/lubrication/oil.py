@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from numbers import Real
 
+from gear.lubrication.viscosity import Vogel, Walther
 from gear.quantities import Density, Expansion, Scalar, Temperature, check
-from gear.viscosity import Vogel, Walther
 
 ROUNDING = 1e-6  # K; a temperature converted from degC may miss the end of the range by rounding
 

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any, Literal, TypeVar
 
-from gear.oil import Oil
+from gear.lubrication.oil import Oil
+from gear.lubrication.viscosity import Vogel, Walther
 from gear.quantities import Density, DynamicViscosity, Scalar, Temperature, check
-from gear.viscosity import Vogel, Walther
 
 CELSIUS = 273.15  # K at 0 degC
 MM2 = 1e-6  # m^2

@@ -6,12 +6,12 @@ from typing import Literal
 
 import casadi as ca
 
-from gear.backlash import Backlash, BacklashAsPrinted, Teeth
-from gear.elastic_law import as_law
+from gear.elasticity.backlash import Backlash, BacklashAsPrinted, Teeth
+from gear.elasticity.law import as_law
+from gear.elasticity.periodic import PeriodicStiffness
+from gear.elasticity.tooth_faults import ToothFaults
 from gear.motion import MeshMotion
-from gear.periodic_stiffness import PeriodicStiffness
 from gear.quantities import Angle, Distance, Scalar, check, check_count
-from gear.tooth_faults import ToothFaults
 
 
 @dataclass(frozen=True, kw_only=True)

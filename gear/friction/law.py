@@ -2,11 +2,11 @@
 
 from typing import Any, Protocol
 
-from gear.coulomb import Coulomb
-from gear.geometry import Pair
+from gear.friction.coulomb import Coulomb
+from gear.friction.periodic import PeriodicFriction, UniformFriction
 from gear.motion import Sliding
-from gear.periodic_friction import PeriodicFriction, UniformFriction
 from gear.quantities import Scalar
+from gear.teeth.geometry import Pair
 
 __all__ = ["Coulomb", "FrictionLaw", "FrictionLaws", "require_suited"]
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from gear.lubricant import Lubricants
+from gear.lubrication.lubricant import Lubricants
 from gear.quantities import Exponent, Factor, Length, Scalar, check
 
 BOUNDARY = 2000.0  # mm^2/s times 1/min, below which Palmgren's torque no longer falls

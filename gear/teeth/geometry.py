@@ -1,11 +1,11 @@
-"""Gear pairs as a mesh sees them, and external involute pairs from their teeth. Rings: see `gear.internal`."""
+"""Gear pairs as a mesh sees them, and external involute pairs from their teeth. Rings: see `gear.teeth.internal`."""
 
 import math
 from dataclasses import dataclass
 from typing import Protocol
 
 from gear.quantities import Arm, HelixAngle, Length, Number, PressureAngle, Scalar, check, show
-from gear.toothed_pair import ToothedPair
+from gear.teeth.toothed_pair import ToothedPair
 
 
 class Pair(Protocol):
@@ -69,7 +69,7 @@ class ExternalPair(ToothedPair):
     atan(tan(alpha_n) / cos(beta)) in the plane of the wheels; a is the center distance and a_0 that without
     shifts. The excess (zero where the shifts cancel) keeps the clearance between tip and root.
 
-    Friction is averaged over the path of contact, see `gear.involute.Path`.
+    Friction is averaged over the path of contact, see `gear.teeth.involute.Path`.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ class GivenPair:
     friction_factor : float
         d_F [-].
     friction_arm_a, friction_arm_b : float
-        -d_tauA and d_tauB [m], the latter with the signs of `gear.internal.InternalPair` where B is a ring.
+        -d_tauA and d_tauB [m], the latter with the signs of `gear.teeth.internal.InternalPair` where B is a ring.
     base_helix_angle : float
         beta_b [rad], which friction laws may ask for; 0 for spur teeth.
     tooth_pitch : float or None

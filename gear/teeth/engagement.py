@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
 import numpy as np
 from scipy.integrate import simpson
 
-from gear.geometry import ExternalPair
-from gear.internal import InternalPair
+from gear.teeth.geometry import ExternalPair
+from gear.teeth.internal import InternalPair
 
 if TYPE_CHECKING:
     import xarray

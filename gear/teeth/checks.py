@@ -3,8 +3,8 @@
 import math
 from typing import Any
 
-from gear.involute import LOWEST_ANGLE, Gearing, Rack, Teeth, gearing, involute, working_involute
 from gear.quantities import check_count
+from gear.teeth.involute import LOWEST_ANGLE, Gearing, Rack, Teeth, gearing, involute, working_involute
 
 UNDERCUT_ALLOWED = 0.01  # modules; the customary limit of 17 teeth at 20 degrees lacks 0.006
 

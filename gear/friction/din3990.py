@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from gear.geometry import Pair
-from gear.lubricant import Lubricants
+from gear.lubrication.lubricant import Lubricants
 from gear.motion import Sliding
 from gear.quantities import Length, PositiveCoefficient, Scalar, Share, check
+from gear.teeth.geometry import Pair
 
 FORCE_FLOOR = 1e-3  # N; below it the coefficient is constant, as its slope over the force is infinite at zero
 SI = 1e-3  # the bracket with N/mm, um, mPa s, m/s, mm over the one with N/m, m, Pa s, m/s, m: 1e-3 1e6 / (1e3 1e3)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import casadi as ca
 import numpy as np
 
-from gear.elastic_law import AT_REST, ElasticityLaw, ToothSpring, as_law, has_gap
+from gear.elasticity.law import AT_REST, ElasticityLaw, ToothSpring, as_law, has_gap
 
 if TYPE_CHECKING:
     import xarray

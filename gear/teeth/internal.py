@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from gear.toothed_pair import ToothedPair
+from gear.teeth.toothed_pair import ToothedPair
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -14,7 +14,7 @@ class InternalPair(ToothedPair):
         r_B < 0:   x_B = -r_B phi_B,   l_B = r_B cos(alpha) < 0,   length T1T2 = (r_A + r_B) sin(alpha) < 0
 
     so that both wheels turn the same way and the normal force turns them opposite ways. Friction is averaged over
-    the path of contact, see `gear.involute.Path`. Its arm on the ring is d_tauB taken with the signed length,
+    the path of contact, see `gear.teeth.involute.Path`. Its arm on the ring is d_tauB taken with the signed length,
     the negative of the one that true radii give; the moment balance d_tauA + d_tauB = T1T2 d_F is that of any pair.
 
         inv(alpha_w) = inv(alpha_t) + 2 tan(alpha_n) (shift_a + shift_b) / (teeth_a - teeth_b)

@@ -7,10 +7,10 @@ from typing import Literal
 
 import casadi as ca
 
-from gear.backlash import Backlash, BacklashAsPrinted, Teeth
-from gear.elastic_law import as_law
+from gear.elasticity.backlash import Backlash, BacklashAsPrinted, Teeth
+from gear.elasticity.law import as_law
+from gear.elasticity.periodic import PeriodicStiffness
 from gear.motion import MeshMotion
-from gear.periodic_stiffness import PeriodicStiffness
 from gear.quantities import Angle, Scalar, Share, check, check_count
 
 LOG_3 = math.log(3.0)  # (1 + tanh)/2 is 10 % and 90 % at -+ log(3)

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from gear.elastic_law import DEFLECTION_NOMINAL, pushing
-from gear.linear import Linear
+from gear.elasticity.law import DEFLECTION_NOMINAL, pushing
+from gear.elasticity.linear import Linear
+from gear.elasticity.progressive import ProgressiveISO, ProgressiveNiemann
 from gear.motion import MeshMotion
-from gear.progressive import ProgressiveISO, ProgressiveNiemann
 from gear.quantities import Distance, Scalar, check
 
 Teeth = Linear | ProgressiveISO | ProgressiveNiemann  # every tooth spring, as fields of files know them

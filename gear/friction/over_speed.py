@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from gear.friction.speed_axis import require_axis
+from gear.friction.tables import piecewise_linear
 from gear.motion import Sliding
 from gear.quantities import (
     AtLeastOne,
@@ -14,8 +16,6 @@ from gear.quantities import (
     ViscousCoefficient,
     check,
 )
-from gear.speed_axis import require_axis
-from gear.tables import piecewise_linear
 
 SPEED_FLOOR = 1e-12  # m/s, added to the speed: keeps the logarithm in the slope over the exponent finite
 

@@ -1,12 +1,12 @@
 """Elasticity of the teeth: what a mesh asks of it, and the laws that answer."""
 
-from gear.backlash import Backlash, BacklashAsPrinted, Teeth
-from gear.elastic_law import DEFLECTION_NOMINAL, ElasticityLaw, Gapless, ToothSpring, as_law, has_gap
-from gear.linear import Linear
-from gear.periodic_stiffness import PeriodicStiffness
-from gear.progressive import ProgressiveISO, ProgressiveNiemann
-from gear.tooth_faults import ToothFaults
-from gear.transmission_error import TransmissionError
+from gear.elasticity.backlash import Backlash, BacklashAsPrinted, Teeth
+from gear.elasticity.law import DEFLECTION_NOMINAL, ElasticityLaw, Gapless, ToothSpring, as_law, has_gap
+from gear.elasticity.linear import Linear
+from gear.elasticity.periodic import PeriodicStiffness
+from gear.elasticity.progressive import ProgressiveISO, ProgressiveNiemann
+from gear.elasticity.tooth_faults import ToothFaults
+from gear.elasticity.transmission_error import TransmissionError
 
 __all__ = [
     "DEFLECTION_NOMINAL",

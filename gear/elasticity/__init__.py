@@ -1,0 +1,1 @@
+"""Elasticity laws: tooth springs, backlash around them, and errors of the teeth."""

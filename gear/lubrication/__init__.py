@@ -1,0 +1,1 @@
+"""Lubrication: viscosity over temperature, oils, and the drag of oil beside the meshes."""

@@ -1,0 +1,1 @@
+"""Teeth: pairs of wheels, their geometry, and how their teeth engage."""

@@ -1,27 +1,15 @@
 """Cases: an actuator with a scenario to run it through, built in or from a file."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import Field, dataclass, field, fields, make_dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 from annotated_types import Gt, Unit
 
 from actuator.actuator import Actuator
-from actuator.parts.current_source import CurrentSource
-from actuator.parts.dc_link import DCLink
-from actuator.parts.inverter import Inverter
-from actuator.parts.linear_load import LinearLoad
-from actuator.parts.load import Load
-from actuator.parts.motor import PMSM, DCMotor, TorqueSource
-from actuator.parts.sensors import Sensors
-from actuator.parts.thermal import ThermalNetwork
 from actuator.simulation.signals import Signal
-from controllers.cascade import Cascade
-from controllers.pid import PID
-from controllers.sampling import Sampling
 from gear.quantities import check, require_known
-from gear.transmission import Transmission
 from studies.converter import SIGNALS
 from studies.files import CaseFile, built_in_files, locate, read
 from studies.structure import structure
@@ -55,6 +43,11 @@ class Case:
     inputs: Mapping[str, Signal]
 
 
+def _again(part: Field) -> Any:
+    """A field with the same default."""
+    return field(default=part.default, default_factory=part.default_factory)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Scenario:
     """The table `[scenario]`; the signals are made once the units of the inputs are known.
@@ -74,27 +67,18 @@ class Scenario:
         check(self)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Document:
-    """The top level of a case file; the fields in the middle are those of Actuator."""
-
-    title: str
-    description: str = ""
-    motor: TorqueSource | CurrentSource | DCMotor | PMSM
-    inverter: Inverter | None = None
-    link: DCLink | None = None
-    gear: Transmission
-    load: Load | LinearLoad = field(default_factory=Load)
-    controller: PID | Cascade | None = None
-    sampling: Sampling | None = None
-    sensors: Sensors = field(default_factory=Sensors)
-    thermal: ThermalNetwork | None = None
-    scenario: Scenario
-
-    def actuator(self, name: str) -> Actuator:
-        """The parts as one actuator; ValueError where they do not go together."""
-        parts = {part.name: getattr(self, part.name) for part in fields(Actuator) if part.name != "name"}
-        return Actuator(name=name, **parts)
+PARTS = tuple(part for part in fields(Actuator) if part.name != "name")
+Document: Any = make_dataclass(  # the top level of a case file: the fields of Actuator in the middle
+    "Document",
+    [
+        ("title", str),
+        ("description", str, field(default="")),
+        *((part.name, part.type, _again(part)) for part in PARTS),
+        ("scenario", Scenario),
+    ],
+    frozen=True,
+    kw_only=True,
+)
 
 
 def built_in() -> list[str]:
@@ -113,9 +97,9 @@ def load_case(case: str | Path) -> Case:
     source = locate(case, Path())
     file = read(source)
     name = source.name.removesuffix(".toml")
-    document: Document = structure(file, (), Document)
+    document = structure(file, (), Document)
     try:
-        actuator = document.actuator(name)
+        actuator = Actuator(name=name, **{part.name: getattr(document, part.name) for part in PARTS})
     except ValueError as error:
         raise file.error((), str(error)) from None
     return Case(

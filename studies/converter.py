@@ -12,6 +12,7 @@ from cattrs.gen import make_dict_structure_fn
 
 from actuator.simulation.signals import Chirp, Constant, Gust, Ramp, Signal, Sine, Staircase, Step, Sum, Table
 from gear.quantities import require_known
+from gear.quantities.registry import default_part, is_slot, parts
 from studies.units import field_unit, is_number, spellings, split, to_si
 
 Hook = Callable[[Any, Any], Any]
@@ -111,27 +112,40 @@ def _is_list(kind: Any) -> bool:
     return get_origin(kind) is tuple
 
 
-def _members(kind: Any) -> tuple[Any, ...]:
+def _members(kind: Any) -> dict[str, Any]:
+    """The dataclasses that a field may hold, by name: of a union each member, of a slot each of its parts."""
     is_union = get_origin(kind) in (Union, UnionType)
-    return tuple(part for part in get_args(kind) if part is not NoneType) if is_union else (kind,)
+    members = [part for part in get_args(kind) if part is not NoneType] if is_union else [kind]
+    found: dict[str, Any] = {}
+    for member in members:
+        found |= parts(member) if is_slot(member) else {getattr(member, "__name__", str(member)): member}
+    return found
+
+
+def _default(kind: Any) -> str | None:
+    """What is meant where no type is given: the only member of a field, or the default of a slot."""
+    slots = [part for part in (get_args(kind) or [kind]) if is_slot(part)]
+    members = _members(kind)
+    return next(iter(members)) if len(members) == 1 else next(filter(None, map(default_part, slots)), None)
 
 
 def _is_component(kind: Any) -> bool:
-    return all(isinstance(member, type) and is_dataclass(member) for member in _members(kind))
+    return all(isinstance(member, type) and is_dataclass(member) for member in _members(kind).values())
 
 
 def _component(kind: Any, made: Converter, input_unit: str | None) -> Hook:
-    members = {member.__name__: member for member in _members(kind)}
-    hooks = {name: _part(member, made, input_unit) for name, member in members.items()}
-    must = f"must be {'one of ' if len(members) > 1 else ''}{', '.join(members)}"
+    """Told apart by `type`; looked up at each table, as parts may have been registered meanwhile."""
 
     def make(value: Any, _: Any) -> Any:
-        if TAG not in value and len(members) > 1:
+        members, default = _members(kind), _default(kind)
+        must = f"must be {'one of ' if len(members) > 1 else ''}{', '.join(members)}"
+        chosen = value.get(TAG, default)
+        if chosen is None:
             raise Refused(f"is missing; it {must}", TAG, with_value=False)
-        chosen = value.get(TAG, next(iter(members)))
         if not isinstance(chosen, str) or chosen not in members:
             raise Refused(must, TAG)
-        return hooks[chosen]({key: item for key, item in value.items() if key != TAG}, members[chosen])
+        hook = _part(members[chosen], made, input_unit)
+        return hook({key: item for key, item in value.items() if key != TAG}, members[chosen])
 
     return _shaped(dict, make)
 

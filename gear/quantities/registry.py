@@ -5,12 +5,14 @@
     class Coulomb(FrictionLaw): ...
 
 A slot is a protocol: what the actuator asks of a part in that place, with defaults for what most parts need not say.
-A part is held against the protocols of its slots when it registers, and is known by its class name, in files too. Parts
-of other packages are found by the entry points of the group `geared_actuator.parts`, each naming a module that
-registers its parts when it is imported.
+A part is held against the protocols of its slots when it registers, and is known by its class name, in files too. It is
+found in any file of the folder that its slot is in. Parts of other packages are found by the entry points of the group
+`geared_actuator.parts`, each naming a module that registers its parts when it is imported.
 """
 
+import importlib
 import inspect
+import pkgutil
 from collections.abc import Callable
 from functools import cache
 from importlib.metadata import entry_points
@@ -38,7 +40,7 @@ def part(*slots: type, default: bool = False) -> Callable[[Part], Part]:
 
     def register(made: Part) -> Part:
         for slot in slots:
-            _require_contract(made, slot)
+            require_contract(made, slot)
             kinds = _parts.setdefault(slot, {})
             taken = kinds.get(made.__name__)
             if taken is not None and (taken.__module__, taken.__qualname__) != (made.__module__, made.__qualname__):
@@ -57,14 +59,15 @@ def part(*slots: type, default: bool = False) -> Callable[[Part], Part]:
 
 
 def is_slot(kind: Any) -> bool:
-    """Whether parts are registered for it."""
-    return isinstance(kind, type) and kind in _parts
+    """Whether it is a protocol that parts are registered for."""
+    return isinstance(kind, type) and getattr(kind, "_is_protocol", False) and bool(parts(kind))
 
 
 def parts(slot: type) -> dict[str, type]:
-    """The parts of a slot by name, those of other packages with them."""
+    """The parts of a slot by name, in alphabetical order, those of other packages with them."""
+    _load_folder(slot.__module__.rpartition(".")[0])
     _load_others()
-    return dict(_parts.get(slot, {}))
+    return dict(sorted(_parts.get(slot, {}).items()))
 
 
 def default_part(slot: type) -> str | None:
@@ -80,6 +83,15 @@ def slots() -> tuple[type, ...]:
 
 
 @cache
+def _load_folder(package: str) -> None:
+    """Import every file of the folder of a slot, once."""
+    if package:
+        for module in pkgutil.iter_modules(importlib.import_module(package).__path__):
+            if not module.name.startswith("__"):
+                importlib.import_module(f"{package}.{module.name}")
+
+
+@cache
 def _load_others() -> None:
     """Import the parts of other packages, once; one that is broken raises with its name."""
     for entry in entry_points(group=GROUP):
@@ -89,23 +101,36 @@ def _load_others() -> None:
             raise PartError(f"the parts {entry.name} ({entry.value}) cannot be loaded: {error}") from error
 
 
-def _require_contract(made: type, slot: type) -> None:
-    """Raise PartError where a class does not do what its slot asks, naming method and signature."""
+def require_contract(made: type, slot: type) -> None:
+    """Raise PartError where a class does not do what its slot asks, naming method and signature.
+
+    Methods that the slot leaves to its parts (`abstractmethod`) have to be there; the others may be inherited.
+    """
     for name, asked in vars(slot).items():
-        if name.startswith("_") or not inspect.isfunction(asked):
+        if name.startswith("_") or not (inspect.isfunction(asked) or isinstance(asked, property)):
             continue
-        given = getattr(made, name, None)
-        if not callable(given):
-            raise PartError(f"{made.__name__} is no {slot.__name__}: it lacks {name}{inspect.signature(asked)}")
-        wanted, found = inspect.signature(asked).parameters, inspect.signature(given).parameters
-        extra = [key for key, value in found.items() if key not in wanted and value.default is value.empty]
-        missing = [key for key in wanted if key not in found]
-        open_ended = any(value.kind in (value.VAR_POSITIONAL, value.VAR_KEYWORD) for value in found.values())
-        if (missing and not open_ended) or (extra and not open_ended):
-            raise PartError(
-                f"{made.__name__} is no {slot.__name__}: {name}{inspect.signature(given)} should take "
-                f"{inspect.signature(asked)}"
-            )
+        given = inspect.getattr_static(made, name, None)
+        declared = given is not None or name in getattr(made, "__dataclass_fields__", {})
+        if not declared or (given is asked and getattr(asked, "__isabstractmethod__", False)):
+            what = str(inspect.signature(asked)) if inspect.isfunction(asked) else ""
+            raise PartError(f"{made.__name__} is no {slot.__name__}: it lacks {name}{what}")
+        if inspect.isfunction(asked):
+            _require_signature(made, slot, name, asked)
     for name in getattr(slot, "__annotations__", {}):
         if not (hasattr(made, name) or name in getattr(made, "__annotations__", {})):
             raise PartError(f"{made.__name__} is no {slot.__name__}: it does not declare {name}")
+
+
+def _require_signature(made: type, slot: type, name: str, asked: Callable[..., Any]) -> None:
+    given = getattr(made, name)
+    if not callable(given):
+        raise PartError(f"{made.__name__} is no {slot.__name__}: {name} is no method")
+    wanted, found = inspect.signature(asked).parameters, inspect.signature(given).parameters
+    extra = [key for key, value in found.items() if key not in wanted and value.default is value.empty]
+    missing = [key for key in wanted if key not in found]
+    open_ended = any(value.kind in (value.VAR_POSITIONAL, value.VAR_KEYWORD) for value in found.values())
+    if (missing or extra) and not open_ended:
+        raise PartError(
+            f"{made.__name__} is no {slot.__name__}: {name}{inspect.signature(given)} should take "
+            f"{inspect.signature(asked)}"
+        )

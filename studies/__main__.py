@@ -7,12 +7,12 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from studies.case_commands import THOROUGH, run, run_case
 from studies.cases import built_in, load_case
 from studies.checks.commands import benchmark, cross_check, gear_paper
 from studies.commands import FOLDER, RESUMES
 from studies.frequency.commands import frequency_response
 from studies.hunting.commands import hunting
+from studies.judge.commands import THOROUGH, run, run_case
 from studies.robustness.commands import robustness
 from studies.tuning.commands import tuning
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from studies.kept import Kept, kept_in
+from studies.cache import Kept, kept_in
 
 RESUMES = "What was interrupted goes on where it stopped when the same command is given again."
 FOLDER = click.Path(file_okay=False, path_type=Path)

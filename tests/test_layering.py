@@ -51,7 +51,7 @@ def test_the_leaf_imports_nothing_of_the_project_but_itself(file):
 ACTUATOR = ("parts", "system", "simulation", "linear", "verdict", "orbits", "continuation", "stiction", "describing")
 ROOMS = {
     "actuator": ((*ACTUATOR, "diagnosis", "response"), "system"),
-    "studies": (("hunting", "tuning", "robustness", "frequency", "checks"), None),
+    "studies": (("judge", "hunting", "tuning", "robustness", "frequency", "checks"), None),
 }
 PICTURES = "plots"  # entered by results when they are drawn, and knows them all
 OPEN = ("__init__.py", "__main__.py")  # bring all together

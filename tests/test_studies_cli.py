@@ -213,13 +213,13 @@ def test_an_interrupted_run_says_so_and_goes_on_to_the_same_result(mass, case_fi
 
     out, path = tmp_path / "out", case_file(MASS)
     with monkeypatch.context() as patch:
-        patch.setattr("studies.judge.find_causes", interrupt)
+        patch.setattr("studies.judge.study.find_causes", interrupt)
         outcome = invoke(path, "--out", out)
     assert outcome.exit_code == 130
     assert outcome.output.splitlines()[1:] == ["", "interrupted; the same command goes on where it stopped"]
     assert [each.name for each in out.iterdir()] == ["finished.jsonl"]
     for name in ("find_orbit", "hunting_margin"):
-        monkeypatch.setattr(f"studies.judge.{name}", lambda *arguments, **options: pytest.fail("computed again"))
+        monkeypatch.setattr(f"studies.judge.study.{name}", lambda *arguments, **options: pytest.fail("computed again"))
     outcome = invoke(path, "--out", out)
     assert outcome.exit_code == 0, outcome.output
     assert f"taken from {out / 'finished.jsonl'}: orbit, stiction margin, integral gain margin" in outcome.output

@@ -13,10 +13,9 @@ from actuator import Actuator, TorqueSource
 from gear import Bearing, KnownOil, OilAt, Shaft, Thickening, Transmission
 from studies.cases import load_case
 from studies.files import CaseError
-from studies.frequency.against import second
 from studies.frequency.corners import AS_IS, Corners, Place, WrongRequest, corners_of
 from studies.frequency.mask import load_mask
-from studies.frequency.plan import Plan
+from studies.frequency.plan import Plan, second
 from studies.specification import load_specification
 
 AILERON = load_case("aileron")

@@ -18,12 +18,11 @@ from actuator import SimulationError, SineStream
 from studies.__main__ import main
 from studies.cases import load_case
 from studies.files import CaseError
-from studies.frequency.against import load_positioner
 from studies.frequency.bench import TESTS, BenchPlan
 from studies.frequency.corners import WrongRequest
 from studies.frequency.mask import Limit, checked, load_mask, phase_of
 from studies.frequency.page import _assumed
-from studies.frequency.plan import PARTS
+from studies.frequency.plan import PARTS, load_positioner
 from studies.frequency.tables import write_netcdf
 
 INERTIA, GAIN, RATE, INTEGRAL = 1.0, 100.0, 8.0, 50.0

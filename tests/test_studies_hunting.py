@@ -14,13 +14,12 @@ from click.testing import CliRunner
 from mass_on_guide import MassOnGuide
 
 from studies.__main__ import main
+from studies.cache import Kept, Stages
+from studies.corners import Setting, meaning, parameters_of
 from studies.hunting import map as maps
 from studies.hunting.ends import along, crossings, ends, with_boundary
 from studies.hunting.map import LABELS, Axis, Plan, compute, dataset
-from studies.hunting.settings import Setting, meaning, parameters_of
 from studies.hunting.study import WrongPlan, plan_of
-from studies.kept import Kept
-from studies.stages import Stages
 
 BREAKAWAY, GAIN = "gear.bearings.guide.breakaway", "controller.integral"
 MASS = """

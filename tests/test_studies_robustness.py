@@ -16,7 +16,7 @@ from mass_on_guide import MassOnGuide
 
 from actuator import classify, simulate
 from studies.__main__ import main
-from studies.kept import Kept
+from studies.cache import Kept
 from studies.robustness.robustness import MissingLibrary, factors, robustness, spread, wilson
 from studies.specification import Tolerance
 

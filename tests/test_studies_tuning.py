@@ -22,15 +22,14 @@ from controllers.pid import PI, PID, P
 from gear import Bearing, Shaft, Stribeck, Transmission
 from studies import CaseError, load_case
 from studies.__main__ import main
-from studies.hunting.settings import Setting, parameters_of
-from studies.kept import Kept, fingerprint
+from studies.cache import Kept, fingerprint
+from studies.corners import Setting, parameters_of
 from studies.specification import Change, Corner, Demand, Specification, Tuning, load_specification
 from studies.tuning.check import SINE, Bench, CornerCheck, Trial, check_corners, step_trials
-from studies.tuning.corners import corner_modes, slides_as_it_breaks_away
 from studies.tuning.design import Active, design
-from studies.tuning.margins import phase_and_delay_margin
+from studies.tuning.loops import curves_at, phase_and_delay_margin
 from studies.tuning.measures import measures, worst
-from studies.tuning.models import curves_at
+from studies.tuning.modes import corner_modes, slides_as_it_breaks_away
 from studies.tuning.plant import (
     INTEGRAL,
     POSITION,

@@ -20,10 +20,9 @@ from controllers.pid import PI, P
 from gear import Bearing, Shaft, Transmission
 from studies.specification import Corner, Demand, Specification, Tuning, load_specification
 from studies.tuning.check import check_corners
-from studies.tuning.corners import corner_modes
-from studies.tuning.margins import gain_margin, phase_and_delay_margin
+from studies.tuning.loops import curves_at, gain_margin, phase_and_delay_margin
 from studies.tuning.measures import measures
-from studies.tuning.models import curves_at
+from studies.tuning.modes import corner_modes
 from studies.tuning.plant import INTEGRAL, POSITION, SPEED, NotTunable, for_linear_models
 from studies.tuning.study import tune
 

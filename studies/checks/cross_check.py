@@ -9,6 +9,7 @@ from collections.abc import Callable, MutableMapping
 from pathlib import Path
 from typing import NamedTuple
 
+from studies.cache import Stages, fingerprint
 from studies.checks.cross_check_actuator import Recorded as RecordedRod
 from studies.checks.cross_check_actuator import check_actuator
 from studies.checks.cross_check_actuator import recorded as recorded_rod
@@ -16,8 +17,6 @@ from studies.checks.cross_check_drive import check_drive
 from studies.checks.cross_check_record import Recorded, WrongRecord, recorded
 from studies.checks.deviation import Deviation, table
 from studies.findings import Findings, png
-from studies.kept import fingerprint
-from studies.stages import Stages
 
 ACTUATOR_FILE, DRIVE_FILE = "dymola_result.csv", "reference.npz"
 SHARE = 0.9  # of the time that the actuator takes

@@ -37,9 +37,9 @@ from gear.efficiency import efficiency
 from gear.elasticity.law import AT_REST
 from gear.friction.tabulated_efficiency import EfficiencyPoint
 from gear.motion import Sliding
+from studies.cache import Stages
 from studies.checks.paper import figure_9, figure_9_inputs, figure_9_start
 from studies.findings import Findings, png
-from studies.stages import Stages
 
 PAIR = ExternalPair(teeth_a=20, teeth_b=60, module=1e-3)
 FACE_WIDTH = 0.01  # m; the paper gives none

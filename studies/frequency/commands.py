@@ -11,10 +11,9 @@ from studies.cases import Case
 from studies.commands import JOBS, RESUMES, announce, begun, out_option, refusing
 from studies.files import CaseError
 from studies.findings import PAGE
-from studies.frequency.against import load_positioner, second, source_of
 from studies.frequency.corners import WrongRequest, corners_of
 from studies.frequency.mask import load_mask
-from studies.frequency.plan import Plan
+from studies.frequency.plan import Plan, load_positioner, second, source_of
 from studies.frequency.report import study_findings
 from studies.frequency.study import study
 

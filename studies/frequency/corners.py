@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from actuator import Actuator, temperature_sets
+from studies.corners import Setting, parameters_of, setting_of
 from studies.files import built_in_files, locate, read
-from studies.hunting.settings import Setting, parameters_of, setting_of
 from studies.specification import Specification, built_in_specifications, load_specification
 
 AS_IS = "as it is"

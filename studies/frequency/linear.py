@@ -16,9 +16,9 @@ from actuator import (
     mode_models,
     poles,
 )
+from actuator.linear.margins.sensitivity import Peak, Sensitivities, peak_of, sensitivities
 from actuator.system.builder import PREFIX
 from studies.frequency.corners import Place
-from studies.frequency.sensitivity import Peak, Sensitivities, peak_of, sensitivities
 
 OUTPUT = "load_angle"
 LOAD = "load_torque"

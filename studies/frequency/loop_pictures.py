@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from actuator.linear.margins.sensitivity import Peak, Sensitivities
 from actuator.plots.linear import EDGE, LINE_COLORS, LINE_STYLES, MOST_NAMES, SHADE, decibel, plot_modes
 from actuator.simulation.run import FREE
-from studies.frequency.sensitivity import Peak, Sensitivities
 
 LEAST_DB = -60.0  # that is shown of a sensitivity
 LEFT = 10.0  # Hz, up to which the words about a peak stand to its right

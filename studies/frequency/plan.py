@@ -1,12 +1,18 @@
 """What a frequency-response study measures, the same for every actuator that is laid beside another."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 from actuator import Actuator
+from actuator.system.parameters import with_values
+from studies.cases import Case, built_in, load_case
+from studies.files import CaseError
 from studies.frequency.bench import TESTS
 from studies.frequency.corners import Corners, Place, WrongRequest
 from studies.frequency.mask import Mask
+from studies.tuning.plant import dead_banded
+from studies.tuning.tuned_gains import tuned_gains
 
 PARTS = (0.1, 0.2, 0.4)  # of the largest torque, in the sines of torque on the load
 EVERY = 2  # so many frequencies of the reference to one of the torque
@@ -92,3 +98,53 @@ class Plan:
     def points(self, actuator: Actuator) -> int:
         """That are computed for one actuator."""
         return self.sines(actuator) + 2 * len(PARTS) * len(self.torque_frequencies) + len(TESTS)
+
+
+TUNING = ".json"  # ending of the result of a tuning
+
+
+def load_positioner(case: str | Path) -> Case:
+    """A case with a position controller.
+
+    Raises
+    ------
+    CaseError, WrongRequest
+        For a file that cannot be read; for a case without one.
+    """
+    loaded = load_case(case)
+    if "reference" not in [quantity.name for quantity in loaded.actuator.system().inputs]:
+        raise WrongRequest(
+            f"{loaded.name}: has no position controller, so no response to a reference; choose another case"
+        )
+    return loaded
+
+
+def source_of(name: str) -> str | Path:
+    """A case as `load_case` takes it."""
+    return name if name in built_in() else Path(name)
+
+
+def second(name: str, first: Case) -> Case:
+    """A case by name or path, or the first with the gains in the result.json of a tuning.
+
+    Raises
+    ------
+    CaseError, WrongRequest
+        For a file that cannot be read or is neither; for a case that has no such gains, or is the first again.
+    """
+    if not name.endswith(TUNING):
+        other = load_positioner(source_of(name))
+        if other.name == first.name:
+            raise WrongRequest(f"both cases are called {first.name}; a case is not laid beside itself")
+        return other
+    label = f"{first.name}-tuned"
+    try:
+        plant = dead_banded(first.actuator)
+        gains = tuned_gains(Path(name), plant)
+        controller = with_values(plant.controller, "controller", gains.values)
+    except CaseError:
+        raise
+    except ValueError as error:  # an actuator that is not one to be tuned, or a gain that breaks a rule
+        raise WrongRequest(f"{name}: {error}") from None
+    actuator = replace(first.actuator, controller=controller, name=label)
+    return replace(first, name=label, title=f"{first.title}, {gains.words}", actuator=actuator)

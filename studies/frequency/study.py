@@ -22,13 +22,13 @@ from actuator import (
 )
 from actuator.simulation.signals import piece_at
 from actuator.simulation.sweep import sweep
+from studies.cache import Kept, actuator_of, fingerprint
 from studies.cases import Case
 from studies.frequency.bench import CORNERS, TESTS, BenchPlan, BenchWork
 from studies.frequency.corners import Place, WrongRequest
 from studies.frequency.linear import OUTPUT, LinearPart, closed_at, linear_part
 from studies.frequency.mask import LimitCheck, checked
 from studies.frequency.plan import PARTS, Plan
-from studies.kept import Kept, actuator_of, fingerprint
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import click
 
+from studies.cache import Kept, kept_in
 from studies.cases import built_in
 from studies.commands import JOBS, RESUMES, announce, out_option, refusing
 from studies.files import CaseError
 from studies.findings import Findings
 from studies.hunting.map import Plan
 from studies.hunting.study import DATA, WrongPlan, hunting_map, plan_of
-from studies.kept import Kept, kept_in
 
 AXIS = (str, float, float, click.IntRange(1))
 

@@ -9,9 +9,9 @@ import numpy as np
 from actuator import NoOrbit, SimulationError, find_orbit, follow
 from actuator.continuation.branch import BOUND
 from actuator.verdict.verdict import IRREGULAR, REST
+from studies.cache import Stages
+from studies.corners import meaning
 from studies.hunting.map import Index, Plan, load, made_once, seen_at
-from studies.hunting.settings import meaning
-from studies.stages import Stages
 
 if TYPE_CHECKING:
     import xarray

@@ -15,10 +15,9 @@ from actuator.simulation.processes import processes
 from actuator.simulation.run import Run
 from actuator.verdict.decide import decide
 from actuator.verdict.verdict import REST, VERDICTS, Hunting
+from studies.cache import Stages, actuator_of
 from studies.cases import Case, load_case
-from studies.hunting.settings import Setting, meaning, parameters_of
-from studies.kept import actuator_of
-from studies.stages import Stages
+from studies.corners import Setting, meaning, parameters_of
 
 if TYPE_CHECKING:
     import xarray
@@ -50,7 +49,7 @@ class Axis:
     Parameters
     ----------
     name : str
-        As of `studies.hunting.settings`.
+        As of `studies.corners`.
     values : tuple of float
         In SI units, or factors.
     """

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from actuator.diagnosis.causes import INTEGRALS
+from studies.cache import Stages
+from studies.corners import setting_of
 from studies.findings import Findings
 from studies.hunting.ends import CYCLES, EndPoint, along, crossings, ends, with_boundary
 from studies.hunting.map import FAILED, LABELS, Axis, Plan, compute, dataset, load
 from studies.hunting.pictures import plot_map
-from studies.hunting.settings import setting_of
-from studies.stages import Stages
 
 BREAKAWAY = ("*.breakaway", "*.static")
 DEFAULT_X = (0.1, 2.0, 12)  # of the integral gain of the case: first, last, count

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from actuator.stiction.margins import sliding_of
-from studies.kept import fingerprint
+from studies.cache import fingerprint
 from studies.specification import Tolerance, matching
 
 TAILS = 1e-3  # of a normal distribution, on each side, that are left out: three sigma

@@ -13,10 +13,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from actuator.actuator import Actuator
+from studies.cache import actuator_of
 from studies.cases import Case
 from studies.files import CaseError
 from studies.findings import Findings, rendered, versions
-from studies.kept import actuator_of
 from studies.robustness.robustness import CONFIDENCE, Probability, Robustness, robustness
 from studies.specification import Corner, Demand, Specification, matching
 from studies.tuning.check import SINE, STEP, Bench, Trial

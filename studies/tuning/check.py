@@ -18,7 +18,7 @@ from actuator.stiction.margins import SLIDING, at_least_sliding
 from actuator.stiction.standstill import rest_of
 from actuator.verdict.decide import decide
 from actuator.verdict.verdict import REST, Hunting, classify
-from studies.kept import fingerprint
+from studies.cache import fingerprint
 from studies.specification import Corner, Demand
 from studies.tuning.plant import defaults_of
 

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.optimize import minimize, nnls
 
 from studies.specification import Demand, Specification
-from studies.tuning.corners import CornerModes
 from studies.tuning.measures import Measure, measures, worst
+from studies.tuning.modes import CornerModes
 from studies.tuning.plant import NotTunable
 
 EXCHANGES, ITERATIONS = 8, 12

@@ -31,9 +31,8 @@ import numpy as np
 from actuator.linear.derivatives.continuous import Value
 from actuator.linear.operating_point import OperatingPoint
 from studies.specification import Demand
-from studies.tuning.corners import CornerModes, in_flight, moved
-from studies.tuning.margins import gain_margin, phase_and_delay_margin
-from studies.tuning.models import Curves, curves_at
+from studies.tuning.loops import Curves, curves_at, gain_margin, phase_and_delay_margin
+from studies.tuning.modes import CornerModes, in_flight, moved
 from studies.tuning.plant import (
     Effort,
     efforts_of,

@@ -9,9 +9,9 @@ from actuator.simulation.signals import Step
 from actuator.simulation.simulate import simulate
 from actuator.stiction.standstill import rest_of
 from studies.tuning.check import BEFORE
-from studies.tuning.corners import corner_modes, moved
+from studies.tuning.loops import curves_at
 from studies.tuning.measures import worst
-from studies.tuning.models import curves_at
+from studies.tuning.modes import corner_modes, moved
 from studies.tuning.plant import for_linear_models, loops_of
 from studies.tuning.stiction import MOST
 from studies.tuning.stiction import STEP as RUNG

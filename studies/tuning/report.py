@@ -8,9 +8,9 @@ from dataclasses import asdict
 from functools import partial
 from typing import Any
 
+from studies.cache import actuator_of
 from studies.cases import Case
 from studies.findings import Findings, rendered, versions
-from studies.kept import actuator_of
 from studies.tuning.check import CornerCheck
 from studies.tuning.measures import Measure, worst
 from studies.tuning.pictures import loops_picture, margins_picture, steps_picture, trade_off_picture

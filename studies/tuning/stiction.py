@@ -12,7 +12,7 @@ from actuator.actuator import Actuator
 from actuator.simulation.sweep import sweep
 from actuator.stiction.margins import sliding_of
 from actuator.verdict.verdict import REST
-from studies.kept import fingerprint
+from studies.cache import fingerprint
 from studies.specification import Corner, Demand
 from studies.tuning.check import Bench, step_trials
 from studies.tuning.plant import defaults_of

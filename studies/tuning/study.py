@@ -23,9 +23,9 @@ from typing import Any, NamedTuple
 from actuator.actuator import Actuator
 from studies.specification import Corner, Demand, Specification
 from studies.tuning.check import CornerCheck, check_corners
-from studies.tuning.corners import CornerModes, corner_modes
 from studies.tuning.design import FROZEN, Design, design
 from studies.tuning.measures import Measure, measures, worst
+from studies.tuning.modes import CornerModes, corner_modes
 from studies.tuning.plant import (
     NotTunable,
     closed_form,

@@ -22,9 +22,9 @@ from actuator import (
     sensitivity,
     trim,
 )
+from actuator.linear.margins.sensitivity import peak_of, sensitivities, values_of
 from controllers import PID, Sampling
 from gear import Shaft, Transmission
-from studies.frequency.sensitivity import peak_of, sensitivities, values_of
 
 INERTIA, PROPORTIONAL, INTEGRAL, DERIVATIVE = 0.2, 30.0, 40.0, 1.0
 LOOP = "torque_reference"

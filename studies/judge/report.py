@@ -15,7 +15,7 @@ from actuator.plots.linear import plot_bode
 from actuator.plots.runs import plot_run
 from actuator.stiction.margins import MOST
 from studies.findings import Findings, finite, rendered, versions
-from studies.judge import Insight, Judgment
+from studies.judge.study import Insight, Judgment
 
 STEP_VIEW = 1.5  # s of the step that are shown
 CYCLES_VIEW = 3.5  # periods of a cycle that are shown

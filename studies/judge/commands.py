@@ -7,14 +7,13 @@ import click
 
 from actuator import SimulationError
 from actuator.stiction.margins import MOST
+from studies.cache import Stages, kept_in
 from studies.cases import load_case
 from studies.commands import FOLDER, RESUMES, announce, refusing, shares
 from studies.files import CaseError
 from studies.findings import PAGE
-from studies.judge import Judgment, fingerprint_of, judge
-from studies.kept import kept_in
-from studies.report import case_findings
-from studies.stages import Stages
+from studies.judge.report import case_findings
+from studies.judge.study import Judgment, fingerprint_of, judge
 
 THOROUGH = "Explain the hunting of a case even where its runs take long."
 

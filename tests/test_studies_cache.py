@@ -24,9 +24,8 @@ import actuator
 from actuator import SinePoint, SineStream
 from actuator.response.frequency_response import point_key
 from actuator.simulation.processes import processes
+from studies.cache import FILE, PACKAGES, KeepingExecutor, Kept, Missing, Stages, actuator_of, kept_in, program, source
 from studies.cases import load_case
-from studies.kept import FILE, PACKAGES, Kept, actuator_of, kept_in, program, source
-from studies.stages import KeepingExecutor, Missing, Stages
 
 # -- the file -----------------------------------------------------------------------------------------------
 

@@ -36,9 +36,8 @@ from actuator.simulation.signals import piece_at
 from actuator.stiction.margins import ENDINGS, HuntingMargin, hunting_margin
 from actuator.system.builder import PREFIX
 from actuator.verdict.verdict import DIVERGING
+from studies.cache import CONVERTER, KeepingExecutor, Missing, Stages, actuator_of
 from studies.cases import Case
-from studies.kept import actuator_of
-from studies.stages import CONVERTER, KeepingExecutor, Missing, Stages
 
 MODES = ("stuck", "forward", "backward")
 RESOLUTION = 2e-3  # s

@@ -1,0 +1,1 @@
+"""The verdict on one case, with its causes and remedies."""

@@ -15,17 +15,18 @@ from actuator.parts.load import Load
 from actuator.parts.motor import PMSM, DCMotor, TorqueSource
 from actuator.parts.sensors import Sensors
 from actuator.parts.thermal import ThermalNetwork
-from actuator.system.builder import Ledger
+from actuator.system.builder import SystemBuilder
 from actuator.system.compatibility import require_fitting
 from actuator.system.contacts import ContactMechanics
 from actuator.system.drive import ANGLE, Motion, Site, cascade_drive, loops_of, open_drive, pid_drive
-from actuator.system.heat import Heat
+from actuator.system.heat import HeatFlow
 from actuator.system.hybrid import Clock, HybridSystem
 from actuator.system.outputs import Mechanics, observe
 from actuator.system.parameters import Parameter, parameterize, with_values
 from controllers.cascade import Cascade
 from controllers.pid import PID
 from controllers.sampling import LOOPS, Sampling
+from gear.quantities.roles import Heat, ShaftAngle, ShaftSpeed
 from gear.transmission import Transmission
 
 SPEED = 0.1  # rad/s, a usual size
@@ -119,8 +120,8 @@ class _Assembly:
         for name in PARTS:
             parts[name], found = parameterize(getattr(actuator, name), name)
             parameters += found
-        book = Ledger()
-        heat = Heat(book, parts["thermal"])
+        book = SystemBuilder()
+        heat = HeatFlow(book, parts["thermal"])
         gear: Transmission = heat.oiled(parts["gear"])
         kinematics = actuator.gear.kinematics(gear)
         symbols = [
@@ -156,37 +157,39 @@ class _Assembly:
         book.output("motor_torque", "N m", motor_torque)
         book.output("total_load_torque", "N m", load_torque)
 
-        m = ca.SX.sym("m", len(contacts.mode_names()))
+        m = ca.SX.sym("m", len(contacts.mode_variables()))
         modes = contacts.modes(m)
         forces = contacts.forces(angle, speed, torque, modes)
-        for known, unit, nominal, rates in (
-            (symbols[0], "rad", ANGLE, speed),
-            (symbols[1], "rad/s", SPEED, forces.acceleration),
+        for known, unit, nominal, role, rates in (
+            (symbols[0], "rad", ANGLE, ShaftAngle, speed),
+            (symbols[1], "rad/s", SPEED, ShaftSpeed, forces.acceleration),
         ):
             for shaft, symbol in known.items():
-                book.state(symbol.name(), unit, nominal, symbol=symbol)
+                owner = f"shaft {shaft}"
+                book.state(symbol.name(), unit, nominal, symbol=symbol, roles=(role(shaft),), owner=owner)
                 book.rate(symbol.name(), rates[shaft])
         seen = Mechanics(contacts, forces, modes, angle, speed, torque)
         observe(book, seen, motion)
         site.losses.update(seen.losses())
         for name, loss in site.losses.items():
-            book.output(f"{name}_loss", "W", loss)
+            book.output(f"{name}_loss", "W", loss, Heat(name))
         heat.feed(site.losses)
 
         arguments = [book.x(), m, book.u(), ca.vertcat(*(parameter.symbol for parameter in parameters))]
-        fired = ca.SX.sym("fired", len(contacts.margin_names()))
+        fired = ca.SX.sym("fired", len(contacts.events()))
         settle = contacts.reset_function("settle", arguments, fired, angle, speed, torque, m)
         clocks = _clocks(actuator.sampling)
         self.system = HybridSystem(
             name=actuator.name,
             states=book.states,
-            modes=tuple(contacts.mode_names()),
+            mode_variables=tuple(contacts.mode_variables()),
             inputs=book.inputs,
             outputs=book.outputs,
-            margin_names=tuple(contacts.margin_names()),
+            events=tuple(contacts.events()),
             parameters=tuple(parameters),
-            travel=_travel(actuator.gear),
+            contacts=tuple(contacts.records(_travel(actuator.gear))),
             flow=ca.Function("flow", arguments, [book.flow()], SHARED),
+            contact_state=ca.Function("contact_state", arguments, contacts.state(forces), SHARED),
             margins=ca.Function("margins", arguments, [contacts.margins(forces, modes)], SHARED),
             reset=_whole_reset(settle, arguments, [state.name for state in book.states], list(symbols[1].values())),
             check=lambda values: _check_values(actuator, values),
@@ -197,7 +200,7 @@ class _Assembly:
             begin=book.begin(arguments[3]),
         )
 
-    def _load_torque(self, book: Ledger, load: Any, motion: Motion) -> ca.SX:
+    def _load_torque(self, book: SystemBuilder, load: Any, motion: Motion) -> ca.SX:
         """Of the load itself and from outside, as a torque on the output shaft."""
         at, outside = (motion.load_angle, motion.load_speed), book.input("load_torque", "N m")
         force = (book.input("load_force", "N"),) if isinstance(load, LinearLoad) else ()

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Annotated, Literal
 
 from controllers.compensation import Dither, FrictionCompensation, Knocker
 from controllers.feedforward import FeedForward
@@ -13,6 +13,7 @@ from controllers.reference import RateAndAccelerationLimit, RateLimit
 from controllers.scheduling import ScheduledGain
 from controllers.units import Speed
 from gear.quantities import check, check_choice
+from gear.quantities.roles import InLoop
 
 Filter = LowPass | SecondOrderLowPass | Notch | LeadLag
 CurrentDemand = Literal["quadrature", "least current"]
@@ -85,9 +86,9 @@ class Cascade:
         Where parts do not go together.
     """
 
-    position: P | PI | None
-    speed: PI
-    current: PI | None
+    position: Annotated[P | PI | None, InLoop("position")]
+    speed: Annotated[PI, InLoop("speed")]
+    current: Annotated[PI | None, InLoop("current", "electrical")]
     speed_limit: Speed
     feedback: Literal["load", "motor"] = "load"
     decoupling: bool = True

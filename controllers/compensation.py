@@ -5,7 +5,7 @@ Each gives an output (a torque, where the law's output is one) that is added to 
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import casadi as ca
 
@@ -13,6 +13,7 @@ from controllers.memory import Memory
 from controllers.shapes import direction
 from controllers.units import ErrorBand, ErrorWidth, Frequency, Level, Limit, Speed, Time
 from gear.quantities import Scalar, check, check_choice
+from gear.quantities.roles import Breakaway, Compensates
 
 Shape = Literal["sine", "square"]
 SHAPES: tuple[Shape, ...] = ("sine", "square")
@@ -41,7 +42,7 @@ class FrictionCompensation:
     """
 
     coulomb: Level
-    breakaway: Level
+    breakaway: Annotated[Level, Compensates(Breakaway)]
     standstill: Speed
     width: ErrorWidth
     dead_band: ErrorBand = 0.0

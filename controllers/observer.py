@@ -4,6 +4,7 @@ All take the exact step for inputs that are held over a sample, so their poles a
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import casadi as ca
 
@@ -11,6 +12,7 @@ from controllers.memory import Memory
 from controllers.shapes import closing_rate
 from controllers.units import Frequency, Inertia, Time
 from gear.quantities import Scalar, check
+from gear.quantities.roles import IntegralGain
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +39,7 @@ class DisturbanceObserver:
     """
 
     inertia: Inertia
-    bandwidth: Frequency
+    bandwidth: Annotated[Frequency, IntegralGain()]
 
     def __post_init__(self) -> None:
         check(self)

@@ -4,6 +4,9 @@ from typing import Annotated
 
 from annotated_types import Ge, Gt, Le, Lt, Unit
 
+from gear.quantities import roles
+from gear.quantities.roles import LoopGain
+
 Rate = Annotated[float, Unit("1/s"), Ge(0)]
 Time = Annotated[float, Unit("s"), Gt(0)]
 Speed = Annotated[float, Unit("rad/s"), Gt(0)]
@@ -12,11 +15,11 @@ Frequency = Annotated[float, Unit("rad/s"), Gt(0)]
 DampingRatio = Annotated[float, Unit("-"), Gt(0)]
 Share = Annotated[float, Unit("-"), Ge(0), Le(1)]
 ShareBelowOne = Annotated[float, Unit("-"), Ge(0), Lt(1)]
-Gain = Annotated[float, Unit("output/error"), Ge(0)]
-PositiveGain = Annotated[float, Unit("output/error"), Gt(0)]
-IntegralGain = Annotated[float, Unit("output/(error s)"), Ge(0)]
-DerivativeGain = Annotated[float, Unit("output s/error"), Ge(0)]
-Limit = Annotated[float, Unit("output"), Gt(0)]
+Gain = Annotated[float, Unit("output/error"), Ge(0), LoopGain("proportional")]
+PositiveGain = Annotated[float, Unit("output/error"), Gt(0), LoopGain("proportional")]
+IntegralGain = Annotated[float, Unit("output/(error s)"), Ge(0), roles.IntegralGain()]
+DerivativeGain = Annotated[float, Unit("output s/error"), Ge(0), LoopGain("derivative")]
+Limit = Annotated[float, Unit("output"), Gt(0), roles.Limit()]
 Level = Annotated[float, Unit("output"), Ge(0)]
 ErrorBand = Annotated[float, Unit("error"), Ge(0)]
 ErrorWidth = Annotated[float, Unit("error"), Gt(0)]

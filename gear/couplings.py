@@ -7,6 +7,7 @@ from annotated_types import Ge, Unit
 
 from gear.elasticity.law import pushing
 from gear.quantities import Angle, Scalar, TorsionalDamping, TorsionalStiffness, check, show
+from gear.quantities.roles import Gap
 
 TWIST_NOMINAL = 1e-4  # rad; couplings under load twist by about this
 
@@ -48,7 +49,7 @@ class Coupling:
     b: str | None = None
     stiffness: TorsionalStiffness
     damping: TorsionalDamping
-    gap: Annotated[float, Unit("rad"), Ge(0)] | None = None
+    gap: Annotated[float, Unit("rad"), Ge(0), Gap()] | None = None
 
     def __post_init__(self) -> None:
         check(self)

@@ -2,10 +2,12 @@
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Annotated
 
 from gear.friction.tables import piecewise_linear
 from gear.lubrication.drag import Palmgren, Thickening
 from gear.quantities import Distance, FrictionTorque, Inertia, Scalar, TorsionalDamping, check, show
+from gear.quantities.roles import Breakaway, SlidingFriction
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,8 +52,8 @@ class Bearing:
     """
 
     shaft: str
-    coulomb: FrictionTorque
-    breakaway: FrictionTorque
+    coulomb: Annotated[FrictionTorque, SlidingFriction()]
+    breakaway: Annotated[FrictionTorque, Breakaway(floor="coulomb")]
     viscous: TorsionalDamping = 0.0
     load_arm: Distance = 0.0
     thickening: Thickening | None = None

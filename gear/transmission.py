@@ -24,6 +24,7 @@ class Contact(NamedTuple):
     """A place where friction can stick, as the joint decision sees it."""
 
     name: str  # path of the mesh or bearing in the transmission
+    place: str  # "mesh" or "bearing"
     slip: dict[str, float]  # slip speed per shaft speed
     torque: dict[str, float]  # torque on each shaft per friction scalar
     speed_nominal: float  # a usual slip speed
@@ -136,6 +137,7 @@ class Transmission:
             found += [
                 Contact(
                     f"bearings.{name}",
+                    "bearing",
                     {shaft: 1.0},
                     {shaft: -1.0},
                     BEARING_SPEED_NOMINAL,
@@ -147,6 +149,7 @@ class Transmission:
             found += [
                 Contact(
                     f"meshes.{name}",
+                    "mesh",
                     mesh.slip_per_shaft(),
                     mesh.torque_per_friction(),
                     MESH_SPEED_NOMINAL,

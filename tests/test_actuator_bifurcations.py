@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from actuator import HybridSystem, find_orbit, follow, simulate
-from actuator.system.hybrid import MARGIN_BAND, Quantity
+from actuator.system.hybrid import MARGIN_BAND, Contact, Event, Mode, Place, Quantity
 from actuator.system.parameters import Parameter
 
 
@@ -39,12 +39,12 @@ def twisted():
     return HybridSystem(
         name="twisted cycle",
         states=tuple(Quantity(name, "rad", 1.0, begin) for name, begin in zip("xyab", (1, 0, 0.01, 0), strict=True)),
-        modes=("half.motion",),
+        mode_variables=(Mode("half.motion"),),
         inputs=(),
         outputs=(Quantity("load_angle", "rad"), Quantity("load_speed", "rad/s"), Quantity("motor_angle", "rad")),
-        margin_names=("half turn",),
+        events=(Event("half turn"),),
         parameters=(Parameter("mu", "1/s", 0.5, mu), Parameter("sigma", "1/s", -0.3, sigma)),
-        travel={"half": 1},
+        contacts=(Contact("half", Place.BEARING, "half.motion", None, 1),),
         flow=ca.Function("flow", known, [flow]),
         margins=ca.Function("margins", known, [m * x[1] + MARGIN_BAND]),
         reset=ca.Function("reset", [fired, *known], [x, modes, ca.SX(0)]),

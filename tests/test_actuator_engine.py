@@ -30,7 +30,7 @@ from actuator import (
 from actuator.simulation.compiled import compiler
 from actuator.simulation.engine import engine
 from actuator.simulation.prepared import EngineOptions
-from actuator.system.hybrid import Quantity
+from actuator.system.hybrid import Event, Mode, Quantity
 from actuator.system.parameters import Parameter
 from controllers import PID
 from gear import Bearing, Shaft, Transmission
@@ -50,12 +50,11 @@ def hybrid(*, flow, margins, reset, states=1, modes=1, name="by hand", parameter
     return HybridSystem(
         name=name,
         states=tuple(Quantity(f"x{k}", "m") for k in range(states)),
-        modes=tuple(f"contact{k}.motion" for k in range(modes)),
+        mode_variables=tuple(Mode(f"contact{k}.motion") for k in range(modes)),
         inputs=(Quantity("push", "N"),),
         outputs=(Quantity("double", "m"),),
-        margin_names=tuple(f"margin {k}" for k in range(conditions.shape[0])),
+        events=tuple(Event(f"margin {k}") for k in range(conditions.shape[0])),
         parameters=tuple(parameters),
-        travel={},
         flow=ca.Function("flow", arguments, [ca.vertcat(*flow(x, m, u, arguments[3]))]),
         margins=ca.Function("margins", arguments, [conditions]),
         reset=ca.Function(

@@ -15,6 +15,7 @@ from annotated_types import Ge, Gt, Unit
 from actuator.parts.noise import WhiteNoise
 from controllers.memory import Memory
 from gear.quantities import Angle, Scalar, check, check_count
+from gear.quantities.roles import NoiseLevel, Resolution, SensorOf
 
 ANGLE, CURRENT = 1e-4, 1.0  # usual sizes, for the error control
 
@@ -49,12 +50,12 @@ class AngleSensor:
         Its distribution and seed.
     """
 
-    resolution: Annotated[float, Unit("rad"), Gt(0)] | None = None
+    resolution: Annotated[float, Unit("rad"), Gt(0), Resolution()] | None = None
     offset: Angle = 0.0
     eccentricity: Annotated[float, Unit("rad"), Ge(0)] = 0.0
     eccentricity_phase: Angle = 0.0
     delay: int = 0
-    noise: Annotated[float, Unit("rad"), Ge(0)] | None = None
+    noise: Annotated[float, Unit("rad"), Ge(0), NoiseLevel()] | None = None
     white_noise: WhiteNoise = field(default_factory=WhiteNoise)
 
     def __post_init__(self) -> None:
@@ -113,8 +114,8 @@ class CurrentSensor:
 
     gain_error: Annotated[float, Unit("-"), Gt(-1)] = 0.0
     offset: Annotated[float, Unit("A")] = 0.0
-    resolution: Annotated[float, Unit("A"), Gt(0)] | None = None
-    noise: Annotated[float, Unit("A"), Ge(0)] | None = None
+    resolution: Annotated[float, Unit("A"), Gt(0), Resolution()] | None = None
+    noise: Annotated[float, Unit("A"), Ge(0), NoiseLevel()] | None = None
     white_noise: WhiteNoise = field(default_factory=WhiteNoise)
 
     def __post_init__(self) -> None:
@@ -145,9 +146,9 @@ class Sensors:
         One on each axis of the motor.
     """
 
-    motor: AngleSensor | None = None
-    load: AngleSensor | None = None
-    current: CurrentSensor | None = None
+    motor: Annotated[AngleSensor | None, SensorOf("motor")] = None
+    load: Annotated[AngleSensor | None, SensorOf("load")] = None
+    current: Annotated[CurrentSensor | None, SensorOf("current")] = None
 
 
 def _count(sensor: AngleSensor | CurrentSensor) -> int:

@@ -2,11 +2,13 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Annotated
 
 import casadi as ca
 
 from actuator.parts.electrical import HeatCapacity, HeatResistance
 from gear.quantities import Scalar, Temperature, check, require_known
+from gear.quantities.roles import NodeTemperature
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,7 +23,7 @@ class ThermalNode:
         Heat capacity [J/K]; None where the temperature stays what it is.
     """
 
-    temperature: Temperature
+    temperature: Annotated[Temperature, NodeTemperature()]
     capacity: HeatCapacity | None = None
 
     def __post_init__(self) -> None:

@@ -1,4 +1,4 @@
-"""The book that is kept while an actuator is put together: states, their rates and ticks, inputs, outputs, by name.
+"""What an actuator is put together in: states, their rates and ticks, inputs and outputs, declared by name.
 
 The laws of a control loop run in a `Loop`: in continuous time, or once at every tick that is due. They are
 written down once for both.
@@ -13,11 +13,13 @@ from actuator.system.hybrid import Quantity
 from controllers.integral import last_error
 from controllers.pid import PI, PID
 from gear.quantities import Scalar
+from gear.quantities.roles import ControllerMemory, LoopSignal, Role
 
+CONTROLLER = "controller"  # owner of what its laws keep in mind
 PREFIX = "inject."  # inputs that are added to a signal inside a loop
 
 
-class Ledger:
+class SystemBuilder:
     """States, inputs and outputs as they are declared, with the expressions that belong to them."""
 
     def __init__(self) -> None:
@@ -38,6 +40,8 @@ class Ledger:
         initial: Scalar = 0.0,
         held: bool = False,
         symbol: ca.SX | None = None,
+        roles: tuple[Role, ...] = (),
+        owner: str = "",
     ) -> ca.SX:
         """Declare a state: continuous, or held between ticks; `symbol` where it has one already.
 
@@ -48,7 +52,7 @@ class Ledger:
             known = ca.vertcat(ca.SX(0, 1), *(self._states[other][1] for other in self._begins))
             self._begins[name] = ca.substitute(initial, known, ca.vertcat(ca.SX(0, 1), *self._begins.values()))
             initial = 0.0
-        self._states[name] = (Quantity(name, unit, nominal, initial, held), symbol)
+        self._states[name] = (Quantity(name, unit, nominal, initial, held, roles, owner), symbol)
         return symbol
 
     def held(self, name: str) -> ca.SX:
@@ -65,15 +69,15 @@ class Ledger:
         """What a held state is after a tick."""
         self._ticks[name] = ca.SX(value)
 
-    def input(self, name: str, unit: str) -> ca.SX:
+    def input(self, name: str, unit: str, *roles: Role) -> ca.SX:
         """Declare an input."""
         symbol = ca.SX.sym(name)
-        self._inputs[name] = (Quantity(name, unit), symbol)
+        self._inputs[name] = (Quantity(name, unit, roles=roles), symbol)
         return symbol
 
-    def output(self, name: str, unit: str, value: Scalar) -> None:
+    def output(self, name: str, unit: str, value: Scalar, *roles: Role) -> None:
         """Declare an output."""
-        self._outputs[name] = (Quantity(name, unit), ca.SX(value))
+        self._outputs[name] = (Quantity(name, unit, roles=roles), ca.SX(value))
 
     @property
     def states(self) -> tuple[Quantity, ...]:
@@ -123,7 +127,7 @@ class Loop:
 
     Parameters
     ----------
-    ledger : Ledger
+    builder : SystemBuilder
         Of the actuator.
     due : SX or None
         1 at a tick of this loop; None in continuous time.
@@ -133,24 +137,33 @@ class Loop:
         Ticks from a sample to the moment at which its result is applied.
     """
 
-    def __init__(self, ledger: Ledger, due: ca.SX | None = None, period: Scalar = None, delay: int = 0) -> None:
-        self.ledger, self.due, self.period, self.delay = ledger, due, period, delay
+    def __init__(self, builder: SystemBuilder, due: ca.SX | None = None, period: Scalar = None, delay: int = 0) -> None:
+        self.builder, self.due, self.period, self.delay = builder, due, period, delay
 
     @property
     def sampled(self) -> bool:
         """Whether the loop runs at ticks."""
         return self.due is not None
 
-    def state(self, name: str, unit: str, nominal: float = 1.0, initial: Scalar = 0.0) -> ca.SX:
-        """What a law keeps in mind."""
-        return self.ledger.state(name, unit, nominal, initial=initial, held=self.sampled)
+    def state(  # noqa: PLR0913, PLR0917 - all that a state has
+        self,
+        name: str,
+        unit: str,
+        nominal: float = 1.0,
+        initial: Scalar = 0.0,
+        roles: tuple[Role, ...] = (ControllerMemory(),),
+        owner: str = CONTROLLER,
+    ) -> ca.SX:
+        """What a law, or a sensor that is read in this loop, keeps in mind."""
+        held = self.sampled
+        return self.builder.state(name, unit, nominal, initial=initial, held=held, roles=roles, owner=owner)
 
     def after(self, state: ca.SX, rate: Callable[[], Scalar], after: Callable[[], Scalar]) -> None:
         """How a state goes on: by its rate in continuous time, or to what it is after a tick that is due."""
         if self.due is None:
-            self.ledger.rate(state.name(), rate())
+            self.builder.rate(state.name(), rate())
         else:
-            self.ledger.tick(state.name(), ca.if_else(self.due, after(), state))
+            self.builder.tick(state.name(), ca.if_else(self.due, after(), state))
 
     def integrate(
         self, law: PI | PID, memory: Sequence[ca.SX], error: Scalar, proposed: Scalar, realized: Scalar
@@ -167,32 +180,34 @@ class Loop:
 
     def signal(self, name: str, unit: str, computed: Scalar) -> ca.SX:
         """A named signal of the loop, for the laws that use it: held between ticks, with what is injected there."""
-        now, standing = self.hold(f"controller.{name}", unit, computed)
-        self.ledger.output(name, unit, standing)
-        return now + self.ledger.input(PREFIX + name, unit)
+        now, standing = self.hold(f"controller.{name}", unit, computed, LoopSignal(name))
+        self.builder.output(name, unit, standing, LoopSignal(name))
+        return now + self.builder.input(PREFIX + name, unit, LoopSignal(name))
 
     def applied(self, name: str, unit: str, computed: Scalar) -> ca.SX:
         """A named signal that acts on the plant: held and delayed, with what is injected there."""
-        standing = self.delayed(f"controller.{name}", unit, computed)
-        self.ledger.output(name, unit, standing)
-        return standing + self.ledger.input(PREFIX + name, unit)
+        standing = self.delayed(f"controller.{name}", unit, computed, LoopSignal(name))
+        self.builder.output(name, unit, standing, LoopSignal(name))
+        return standing + self.builder.input(PREFIX + name, unit, LoopSignal(name))
 
-    def delayed(self, name: str, unit: str, computed: Scalar) -> ca.SX:
+    def delayed(self, name: str, unit: str, computed: Scalar, *roles: Role) -> ca.SX:
         """A result as the plant sees it between ticks, `delay` ticks after its sample."""
         due = ca.SX(1) if self.due is None else self.due
         for k in range(self.delay):
-            before = self.ledger.state(f"{name}.pending_{k + 1}", unit, held=True)
-            self.ledger.tick(f"{name}.pending_{k + 1}", ca.if_else(due, computed, before))
+            pending = f"{name}.pending_{k + 1}"
+            before = self.builder.state(pending, unit, held=True, roles=(ControllerMemory(),), owner=CONTROLLER)
+            self.builder.tick(pending, ca.if_else(due, computed, before))
             computed = before
-        return self.hold(name, unit, computed)[1]
+        return self.hold(name, unit, computed, *roles)[1]
 
-    def hold(self, name: str, unit: str, computed: Scalar) -> tuple[ca.SX, ca.SX]:
+    def hold(self, name: str, unit: str, computed: Scalar, *roles: Role) -> tuple[ca.SX, ca.SX]:
         """A result at a tick, for the laws that run then, and as it stands between ticks."""
         if self.due is None:
             return ca.SX(computed), ca.SX(computed)
-        standing = self.ledger.state(name, unit, held=True)
+        roles = (ControllerMemory(), *roles)
+        standing = self.builder.state(name, unit, held=True, roles=roles, owner=CONTROLLER)
         now = ca.if_else(self.due, computed, standing)
-        self.ledger.tick(name, now)
+        self.builder.tick(name, now)
         return now, standing
 
     def memory(self, path: str, law: Any, *kind: Any, first: Scalar = 0.0) -> list[ca.SX]:

@@ -5,8 +5,9 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from actuator.system.hybrid import MARGIN_BAND
-from gear.couplings import TWIST_NOMINAL, Twist
+from actuator.system.hybrid import MARGIN_BAND, Event, EventKind, Mode, ModeKind, Place
+from actuator.system.hybrid import Contact as ContactRecord
+from gear.couplings import TWIST_NOMINAL, EndStop, Twist
 from gear.elasticity.laws import DEFLECTION_NOMINAL, has_gap
 from gear.kinematics import Kinematics
 from gear.motion import MeshMotion
@@ -74,10 +75,35 @@ class ContactMechanics:
         self.gapped = [path for path, law in self.laws.items() if has_gap(law)] + [*self.plays]
         self.flanks = [*self.laws, *self.plays]
 
-    def mode_names(self) -> list[str]:
-        """Names of the mode variables: a motion per contact, a flank per mesh, coupling with a gap and end stop."""
-        motions = [f"gear.{contact.name}.motion" for contact in self.contacts]
-        return motions + [f"gear.{path}.flank" for path in self.flanks]
+    def mode_variables(self) -> list[Mode]:
+        """A motion per contact, a flank per mesh, coupling with a gap and end stop."""
+        motions = [(f"gear.{contact.name}", contact.place, ModeKind.MOTION) for contact in self.contacts]
+        flanks = [(f"gear.{path}", self._place(path), ModeKind.FLANK) for path in self.flanks]
+        return [Mode(f"{at}.{kind}", kind, at, Place(place)) for at, place, kind in motions + flanks]
+
+    def _place(self, path: str) -> Place:
+        """What has a flank: a mesh, a coupling or an end stop."""
+        if path in self.laws:
+            return Place.MESH
+        return Place.STOP if isinstance(self.plays[path], EndStop) else Place.COUPLING
+
+    def records(self, directions: Mapping[str, int]) -> list[ContactRecord]:
+        """The contacts as analyses know them; `directions` in which they slide when the output moves forward."""
+        return [
+            ContactRecord(
+                at := f"gear.{contact.name}",
+                Place(contact.place),
+                f"{at}.{ModeKind.MOTION}",
+                f"{at}.{ModeKind.FLANK}" if contact.name in self.flanks else None,
+                directions[at],
+            )
+            for contact in self.contacts
+        ]
+
+    @staticmethod
+    def state(forces: ContactForces) -> list[Matrix]:
+        """Slip speed, friction, and friction limit at rest and while sliding, of all contacts."""
+        return [forces.slip, forces.friction, forces.static, forces.sliding]
 
     def modes(self, m: ca.SX) -> ContactModes:
         """The mode variables from the vector m; rounding is taken off here, once."""
@@ -174,13 +200,22 @@ class ContactMechanics:
 
     # -- margins --------------------------------------------------------------------------------------
 
-    def margin_names(self) -> list[str]:
-        """Two margins per contact, two per mesh, coupling or stop with a gap and one per mesh without."""
-        names = [f"gear.{contact.name} {end}" for contact in self.contacts for end in ("upper", "lower")]
+    def events(self) -> list[Event]:
+        """Two per contact, two per mesh, coupling or stop with a gap and one per mesh without."""
+        found = [
+            Event(f"gear.{contact.name} {end}", EventKind.FRICTION, f"gear.{contact.name}", Place(contact.place), side)
+            for contact in self.contacts
+            for end, side in (("upper", 1), ("lower", -1))
+        ]
         for path in self.flanks:
-            sides = ("flank +", "flank -") if path in self.gapped else ("flank",)
-            names += [f"gear.{path} {side}" for side in sides]
-        return names
+            at, place = f"gear.{path}", self._place(path)
+            if path in self.gapped:
+                found += [
+                    Event(f"{at} flank {end}", EventKind.GAP, at, place, side) for end, side in (("+", 1), ("-", -1))
+                ]
+            else:
+                found.append(Event(f"{at} flank", EventKind.FORCE, at, place))
+        return found
 
     def _beyond(self, path: str, motions: Mapping, twists: Mapping, side: int) -> Scalar:
         """How far teeth or coupling are beyond their gap on a side, over a usual size."""
@@ -189,7 +224,7 @@ class ContactMechanics:
         return self.laws[path].penetration(motions[path.removeprefix("meshes.")], side) / DEFLECTION_NOMINAL
 
     def margins(self, forces: ContactForces, modes: ContactModes) -> Matrix:
-        """Margins in the order of `margin_names`.
+        """Margins in the order of `events`.
 
         stuck:    (static - s) and (static + s), over a usual friction force
         sliding:  direction * slip speed, over a usual speed

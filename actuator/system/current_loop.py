@@ -10,12 +10,13 @@ from actuator.parts.dc_motor import DCMotor
 from actuator.parts.park import rotated
 from actuator.parts.pmsm import PMSM
 from actuator.parts.torque_source import TorqueSource
-from actuator.system.builder import PREFIX, Ledger, Loop
+from actuator.system.builder import PREFIX, Loop, SystemBuilder
 from actuator.system.parameters import unchecked
 from controllers.current_reference import CurrentReference
 from controllers.pid import PI
 from controllers.shapes import limited
 from gear.quantities import Scalar
+from gear.quantities.roles import LoopSignal
 
 if TYPE_CHECKING:
     from actuator.system.drive import Site
@@ -29,11 +30,11 @@ class PlantVoltages:
     Without a DC link of its own the inverter has a constant voltage.
     """
 
-    def __init__(self, parts: Mapping[str, Any], book: Ledger) -> None:
+    def __init__(self, parts: Mapping[str, Any], book: SystemBuilder) -> None:
         self.motor, self.inverter, self.link = parts["motor"], parts["inverter"], parts["link"]
         self.voltage: Scalar | None = None
         if self.link is not None:
-            self.voltage = book.state("link.voltage", "V", initial=self.link.source_voltage)
+            self.voltage = book.state("link.voltage", "V", initial=self.link.source_voltage, owner="DC link")
         self.demand: CurrentReference | None = None
         if isinstance(self.motor, PMSM) and parts["controller"].current_demand == "least current":
             names = ("pole_pairs", "flux", "inductance_d", "inductance_q")
@@ -69,14 +70,14 @@ def winding(site: "Site", voltages: PlantVoltages, torque: Scalar, speed: Scalar
     if isinstance(motor, CurrentSource):
         return _current_source(site, motor, torque)
     loop = site.loops["current"]
-    currents = [site.book.state(f"motor.{axis}", "A") for axis in motor.axes]
+    currents = [site.book.state(f"motor.{axis}", "A", owner="motor winding") for axis in motor.axes]
     measured = [site.sensed("current", current, path=axis) for axis, current in zip(motor.axes, currents, strict=True)]
     references = voltages.currents(torque, speed, site.winding)
     electrical = [motor.pole_pairs * value for value in (angle, site.motion.motor_angle)] if _turns(motor) else [0, 0]
     realized = _current_control(site, voltages, references, measured, speed, electrical[0])
     applied = _applied(motor, loop, realized, electrical, speed)
     site.book.output("voltage", "V", applied[-1])
-    applied[-1] += site.book.input(PREFIX + "voltage", "V")
+    applied[-1] += site.book.input(PREFIX + "voltage", "V", LoopSignal("voltage"))
     at_terminals = voltages.inverter.terminal_voltages(applied, currents, electrical[1], voltages.voltage)
     rates = motor.derivatives(currents, at_terminals, site.motion.motor_speed, site.temperature)
     for axis, rate in zip(motor.axes, rates, strict=True):
@@ -94,7 +95,7 @@ def _turns(motor: DCMotor | PMSM) -> bool:
 
 def _current_source(site: "Site", motor: CurrentSource, torque: Scalar) -> Scalar:
     demanded = site.loops["speed"].delayed("controller.current", "A", motor.current_for(torque))
-    currents = [site.book.state(f"motor.{axis}", "A") for axis in motor.axes]
+    currents = [site.book.state(f"motor.{axis}", "A", owner="motor winding") for axis in motor.axes]
     for axis, rate in zip(motor.axes, motor.derivatives(currents, demanded), strict=True):
         site.book.rate(f"motor.{axis}", rate)
     site.book.output("current", "A", currents[0] if currents else demanded)

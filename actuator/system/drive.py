@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 
 from actuator.parts.temperature import MotorTemperature
-from actuator.system.builder import Ledger, Loop
+from actuator.system.builder import Loop, SystemBuilder
 from actuator.system.current_loop import PlantVoltages, winding
 from controllers.cascade import Cascade, Remedies
 from controllers.pid import PI, PID
@@ -39,7 +39,7 @@ class Motion:
 class Site:
     """What a drive is built of and where: the book, symbolic parts, motion, loops, and what the rest of it knows."""
 
-    book: Ledger
+    book: SystemBuilder
     parts: Mapping[str, Any]
     motion: Motion
     loops: Mapping[str, Loop]
@@ -69,7 +69,12 @@ class Site:
         kept = sensor.memory() if name == "current" else sensor.memory(true)
         noise = replace(sensor.white_noise, seed=(len(SENSED) + 1) * sensor.white_noise.seed + place).memory()
         memory = [
-            loop.state(f"sensors.{path or name}.{part.name}", *(noise if part.name == noise.name else part)[1:])
+            loop.state(
+                f"sensors.{path or name}.{part.name}",
+                *(noise if part.name == noise.name else part)[1:],
+                roles=(),
+                owner=f"sensor {path or name}",
+            )
             for part in kept
         ]
         for symbol, after in zip(memory, sensor.advance(memory, true), strict=True):
@@ -226,7 +231,7 @@ def _added(remedies: Remedies, loop: Loop, speed: Scalar, error: Scalar) -> Scal
     return added
 
 
-def loops_of(book: Ledger, sampling: Sampling | None, numbers: Sampling | None) -> tuple[dict[str, Loop], ca.SX]:
+def loops_of(book: SystemBuilder, sampling: Sampling | None, numbers: Sampling | None) -> tuple[dict[str, Loop], ca.SX]:
     """A loop by each name, all in continuous time or each at its own ticks, and which of them are due.
 
     `sampling` may be symbolic, `numbers` is the same with the numbers that decide which loops there are.

@@ -7,10 +7,11 @@ import casadi as ca
 
 from actuator.parts.temperature import MotorTemperature
 from actuator.parts.thermal import ThermalNetwork
-from actuator.system.builder import Ledger
+from actuator.system.builder import SystemBuilder
 from actuator.system.parameters import substituted, unchecked
 from gear.lubrication.lubricant import MEASURED, OilAt
 from gear.quantities import Scalar
+from gear.quantities.roles import NodeTemperature
 
 WARM = 1.0  # K, a usual change
 # where a loss goes, and to which node, the first there is
@@ -25,19 +26,26 @@ NODES = {
 }
 
 
-class Heat:
+class HeatFlow:
     """The network of one actuator while it is put together; without one, nothing depends on temperature.
 
     Nodes are known by their names: winding, magnet (else stator, else housing), stator, housing, oil, inverter,
     chopper. A node that is not there neither heats nor is heated.
     """
 
-    def __init__(self, book: Ledger, network: ThermalNetwork | None) -> None:
+    def __init__(self, book: SystemBuilder, network: ThermalNetwork | None) -> None:
         self.book, self.network = book, network
         self.at: dict[str, Scalar] = {}
         if network is not None:
             states = {
-                name: book.state(f"thermal.{name}", "K", WARM, initial=network.nodes[name].temperature)
+                name: book.state(
+                    f"thermal.{name}",
+                    "K",
+                    WARM,
+                    initial=network.nodes[name].temperature,
+                    roles=(NodeTemperature(name),),
+                    owner="thermal network",
+                )
                 for name in network.free
             }
             self.at = network.all_temperatures(states)

@@ -17,25 +17,34 @@ Event rules, stated once:
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from enum import StrEnum
+from typing import NamedTuple, TypeVar
 
 import casadi as ca
 import numpy as np
 
 from actuator.system.parameters import Parameter
-from gear.quantities import require_known
+from gear.quantities import require_known, show
+from gear.quantities.roles import Role
 
 MARGIN_BAND = 1e-10
+AnyRole = TypeVar("AnyRole", bound=Role)
 
 
 class Quantity(NamedTuple):
-    """A named signal with its unit and usual size; a state with where it begins, and whether it is held by a clock."""
+    """A named signal: unit, usual size, roles and owner; a state with where it begins, and whether a clock holds it."""
 
     name: str
     unit: str
     nominal: float = 1.0
     initial: float = 0.0
     held: bool = False
+    roles: tuple[Role, ...] = ()
+    owner: str = ""  # what it belongs to, in words: "motor winding", "shaft load", "controller"
+
+    def role(self, kind: type[AnyRole]) -> AnyRole | None:
+        """Its role of that kind, or None."""
+        return next((role for role in self.roles if isinstance(role, kind)), None)
 
 
 class Clock(NamedTuple):
@@ -43,6 +52,62 @@ class Clock(NamedTuple):
 
     name: str
     every: int = 1
+
+
+class Place(StrEnum):
+    """What a mode, an event or a contact is at."""
+
+    MESH = "mesh"
+    BEARING = "bearing"
+    COUPLING = "coupling"
+    STOP = "end stop"
+
+
+class ModeKind(StrEnum):
+    """What an integer mode variable tells."""
+
+    MOTION = "motion"  # of a contact: 0 stuck, +-1 sliding, +-2 stuck at its limit
+    FLANK = "flank"  # of a mesh, coupling or stop: +1, -1, 0 in its gap
+
+
+class Mode(NamedTuple):
+    """An integer mode variable, and where it is."""
+
+    name: str
+    kind: ModeKind = ModeKind.MOTION
+    at: str = ""  # path of the contact, coupling or stop: "gear.meshes.first"
+    place: Place = Place.MESH
+
+
+class EventKind(StrEnum):
+    """What is left when a margin falls through zero."""
+
+    FRICTION = "friction"  # stuck: the friction limit on a side; sliding: the slip speed reverses
+    GAP = "gap"  # a flank engages or separates
+    FORCE = "force"  # teeth without a gap: the normal force changes its sign
+
+
+class Event(NamedTuple):
+    """What is left when a margin falls through zero, in the order of the vector of margins."""
+
+    name: str
+    kind: EventKind = EventKind.FRICTION
+    at: str = ""
+    place: Place = Place.MESH
+    side: int = 0  # +1, -1; 0 where there is one margin for both sides
+
+
+class Contact(NamedTuple):
+    """A place where friction can stick.
+
+    Its slip speed and friction are `contact_state` of the system; the slip is linear in the speeds of the shafts.
+    """
+
+    name: str  # its path, "gear.meshes.first"
+    place: Place
+    motion: str  # name of its mode variables
+    flank: str | None
+    direction: int  # in which it slides when the output moves forward: +1 or -1
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -59,14 +124,14 @@ class HybridSystem:
     ----------
     states, inputs, outputs : tuple of Quantity
         In the order of the vectors x, u, y. Nominal sizes scale the error control.
-    modes : tuple of str
-        Names of the integer mode variables m.
-    margin_names : tuple of str
-        What is left when the margin falls through zero.
+    mode_variables : tuple of Mode
+        In the order of the vector m.
+    events : tuple of Event
+        What is left when a margin falls through zero, in the order of the margins.
+    contacts : tuple of Contact
+        Where friction can stick.
     parameters : tuple of Parameter
-        In the order of p, with defaults.
-    travel : mapping of str to int
-        Per contact +1 or -1: the direction in which it slides when the output moves forward.
+        In the order of p, with defaults, roles and owners.
     check : callable or None
         Raises ValueError where changed parameters, by name, break a rule.
     flow, margins, reset, outputs_function : casadi.Function
@@ -75,22 +140,26 @@ class HybridSystem:
         Sampled loops; none in continuous time.
     tick, period : casadi.Function or None
         As above; `due` is a vector with 1 at the clocks that are due. None without clocks.
+    contact_state : casadi.Function or None
+        (x, m, u, p) -> slip speed, friction, friction limit at rest, friction while sliding, each (K, 1) in the order
+        of the contacts; None for a system without contacts.
     begin : casadi.Function or None
         (x, p) -> x with the states where they begin that follow other states or parameters; None where none does.
     """
 
     name: str
     states: tuple[Quantity, ...]
-    modes: tuple[str, ...]
+    mode_variables: tuple[Mode, ...]
     inputs: tuple[Quantity, ...]
     outputs: tuple[Quantity, ...]
-    margin_names: tuple[str, ...]
+    events: tuple[Event, ...]
     parameters: tuple[Parameter, ...]
-    travel: Mapping[str, int]
     flow: ca.Function
     margins: ca.Function
     reset: ca.Function
     outputs_function: ca.Function
+    contacts: tuple[Contact, ...] = ()
+    contact_state: ca.Function | None = None
     check: Callable[[Mapping[str, float]], None] | None = None
     clocks: tuple[Clock, ...] = ()
     tick: ca.Function | None = None
@@ -107,6 +176,47 @@ class HybridSystem:
         held = [quantity.held for quantity in self.states]
         if held != sorted(held) or any(held) > bool(self.clocks):
             raise ValueError(f"HybridSystem {self.name}: held states stand behind the others, and need a clock")
+
+    @property
+    def modes(self) -> tuple[str, ...]:
+        """Names of the mode variables."""
+        return tuple(mode.name for mode in self.mode_variables)
+
+    @property
+    def margin_names(self) -> tuple[str, ...]:
+        """Names of the events."""
+        return tuple(event.name for event in self.events)
+
+    @property
+    def travel(self) -> dict[str, int]:
+        """Per contact the direction in which it slides when the output moves forward."""
+        return {contact.name: contact.direction for contact in self.contacts}
+
+    def parameters_having(self, role: type[Role]) -> tuple[Parameter, ...]:
+        """The parameters that have a role, in the order of p."""
+        return tuple(parameter for parameter in self.parameters if parameter.role(role) is not None)
+
+    def signals_having(self, role: type[Role]) -> tuple[Quantity, ...]:
+        """The states, inputs and outputs that have a role."""
+        signals = (*self.states, *self.inputs, *self.outputs)
+        return tuple(quantity for quantity in signals if quantity.role(role) is not None)
+
+    def describe(self, name: str) -> str:
+        """What is declared of a parameter or signal, in a line: value, unit, rules, roles and owner.
+
+        Raises
+        ------
+        KeyError
+            For an unknown name, with the nearest.
+        """
+        known = {quantity.name: quantity for quantity in (*self.states, *self.inputs, *self.outputs)}
+        known |= {parameter.name: parameter for parameter in self.parameters}
+        require_known([name], known, "parameter or signal")
+        quantity = known[name]
+        text = f"{name} [{quantity.unit}]"
+        if isinstance(quantity, Parameter):
+            text = f"{name} = {show(quantity.default, quantity.unit)}"
+        return ", ".join([text, *map(str, quantity.roles), *([f"of {quantity.owner}"] if quantity.owner else [])])
 
     @property
     def moving(self) -> int:

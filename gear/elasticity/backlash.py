@@ -1,6 +1,7 @@
 """Backlash: a gap between the flanks, around any tooth spring."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import casadi as ca
 
@@ -9,6 +10,7 @@ from gear.elasticity.linear import Linear
 from gear.elasticity.progressive import ProgressiveISO, ProgressiveNiemann
 from gear.motion import MeshMotion
 from gear.quantities import Distance, Scalar, check
+from gear.quantities.roles import Gap
 
 Teeth = Linear | ProgressiveISO | ProgressiveNiemann  # every tooth spring, as fields of files know them
 
@@ -40,7 +42,7 @@ class Backlash:
     Modelica Standard Library, Rotational.Components.ElastoBacklash2, for the limited damping.
     """
 
-    gap: Distance
+    gap: Annotated[Distance, Gap()]
     law: Teeth
 
     def __post_init__(self) -> None:
@@ -90,7 +92,7 @@ class BacklashAsPrinted:
     F. L. J. van der Linden, "Modeling of geared positioning systems", eqs. (42) and (43).
     """
 
-    gap: Distance
+    gap: Annotated[Distance, Gap()]
     law: Teeth
 
     def __post_init__(self) -> None:

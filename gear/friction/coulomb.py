@@ -1,9 +1,11 @@
 """Dry friction: one coefficient while sliding, one at rest."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 from gear.motion import Sliding
 from gear.quantities import Coefficient, Scalar, check
+from gear.quantities.roles import Breakaway, SlidingFriction
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,8 +25,8 @@ class Coulomb:
     F. L. J. van der Linden, "Modeling of geared positioning systems", eq. (34).
     """
 
-    sliding: Coefficient
-    static: Coefficient
+    sliding: Annotated[Coefficient, SlidingFriction()]
+    static: Annotated[Coefficient, Breakaway(floor="sliding")]
 
     def __post_init__(self) -> None:
         check(self)

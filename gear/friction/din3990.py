@@ -1,12 +1,14 @@
 """Friction by DIN 3990-4: a film of oil between rough teeth."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import casadi as ca
 
 from gear.lubrication.lubricant import Lubricants
 from gear.motion import Sliding
 from gear.quantities import Length, PositiveCoefficient, Scalar, Share, check
+from gear.quantities.roles import Breakaway
 from gear.teeth.geometry import Pair
 
 FORCE_FLOOR = 1e-3  # N; below it the coefficient is constant, as its slope over the force is infinite at zero
@@ -51,7 +53,7 @@ class Din3990:
     There the cap holds at standstill only, and the viscosity of 275 mPa s has the unit Pa s.
     """
 
-    static: PositiveCoefficient
+    static: Annotated[PositiveCoefficient, Breakaway(floor=None)]  # it caps sliding too, so the two never part
     lubricant: Lubricants
     roughness: Length
     face_width: Length

@@ -1,6 +1,7 @@
 """Friction as a given function of the mesh speed: the Stribeck curve, or a table."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import casadi as ca
 
@@ -16,6 +17,7 @@ from gear.quantities import (
     ViscousCoefficient,
     check,
 )
+from gear.quantities.roles import Breakaway, SlidingFriction
 
 SPEED_FLOOR = 1e-12  # m/s, added to the speed: keeps the logarithm in the slope over the exponent finite
 
@@ -50,8 +52,8 @@ class Stribeck:
     methods for the control of machines with friction", Automatica 30 (1994), 1083-1138.
     """
 
-    static: Coefficient
-    coulomb: Coefficient
+    static: Annotated[Coefficient, Breakaway(floor="coulomb")]
+    coulomb: Annotated[Coefficient, SlidingFriction()]
     stribeck_speed: PositiveMeshSpeed
     exponent: AtLeastOne = 2.0
     viscous: ViscousCoefficient = 0.0
@@ -106,17 +108,21 @@ class FrictionTable:
     """
 
     points: tuple[FrictionPoint, ...]
-    static: Coefficient
+    static: Annotated[Coefficient, Breakaway(floor="onset")]
 
     def __post_init__(self) -> None:
         check(self)
         require_axis("FrictionTable", [point.speed for point in self.points])
-        first = self.points[0].coefficient
-        if self.static < first:
+        if self.static < self.onset:
             raise ValueError(
-                f"FrictionTable needs points[0].coefficient <= static, got {first:g} and static={self.static:g}; "
+                f"FrictionTable needs points[0].coefficient <= static, got {self.onset:g} and static={self.static:g}; "
                 "a breakaway coefficient below the sliding one has no consistent motion at standstill"
             )
+
+    @property
+    def onset(self) -> float:
+        """Sliding coefficient just off standstill [-]."""
+        return self.points[0].coefficient
 
     def coefficient(self, sliding: Sliding) -> Scalar:
         """Sliding coefficient [-]."""

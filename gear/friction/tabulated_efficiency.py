@@ -1,6 +1,7 @@
 """Friction from the efficiency of a mesh, given over speed for each driving side."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import casadi as ca
 
@@ -8,6 +9,7 @@ from gear.friction.speed_axis import require_axis
 from gear.friction.tables import piecewise_linear
 from gear.motion import Sliding
 from gear.quantities import AtLeastOne, MeshSpeed, Scalar, Share, check
+from gear.quantities.roles import Breakaway
 from gear.teeth.geometry import Pair
 
 
@@ -59,7 +61,7 @@ class TabulatedEfficiency:
     """
 
     points: tuple[EfficiencyPoint, ...]
-    breakout: AtLeastOne = 1.0
+    breakout: Annotated[AtLeastOne, Breakaway(floor=1.0)] = 1.0
 
     def __post_init__(self) -> None:
         check(self)

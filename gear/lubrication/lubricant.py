@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 from gear.lubrication.oil import Oil
 from gear.lubrication.viscosity import Vogel, Walther
 from gear.quantities import Density, DynamicViscosity, Scalar, Temperature, check
+from gear.quantities.roles import OilTemperature
 
 CELSIUS = 273.15  # K at 0 degC
 MM2 = 1e-6  # m^2
@@ -152,7 +153,7 @@ class OilAt:
     """
 
     oil: Oil | KnownOil
-    temperature: Temperature
+    temperature: Annotated[Temperature, OilTemperature()]
 
     def __post_init__(self) -> None:
         check(self)

@@ -52,9 +52,9 @@ def check(owner: Any) -> None:
     """
     for field in fields(owner):
         value, notes = getattr(owner, field.name), annotations(owner)[field.name]
-        if value is None or not notes:
-            continue
         unit = unit_of(owner, field.name)
+        if value is None or unit is None:
+            continue
         where = f"{type(owner).__name__}.{field.name}"
         if not is_number(value):
             raise ValueError(f"{where} must be a finite number [{unit}], got {value!r}")

@@ -55,6 +55,18 @@ class IntegralGain(Role):
 
 
 @dataclass(frozen=True)
+class InLoop(Role):
+    """The control loop whose law it belongs to. Declared of a law, all numbers of the law have it.
+
+    A loop of `motion` acts on angles and speeds, so that its integral winds up against a contact that sticks; one that
+    is `electrical` acts on currents and does not.
+    """
+
+    loop: str
+    domain: Literal["motion", "electrical"] = "motion"
+
+
+@dataclass(frozen=True)
 class Limit(Role):
     """Bound of a signal: reaching it makes the actuator nonlinear."""
 
@@ -64,6 +76,13 @@ class Compensates(Role):
     """A setting of a compensation of the friction that has the other role; it is not that friction."""
 
     role: type[Role]
+
+
+@dataclass(frozen=True)
+class SensorOf(Role):
+    """What a sensor reads: "motor", "load", "current". Declared of a sensor, all its numbers have it."""
+
+    reads: str
 
 
 @dataclass(frozen=True)

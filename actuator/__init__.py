@@ -124,7 +124,7 @@ from actuator.stiction.margins import HuntingMargin as HuntingMargin
 from actuator.stiction.margins import hunting_margin as hunting_margin
 from actuator.stiction.margins import hunting_margins as hunting_margins
 from actuator.system.hybrid import HybridSystem as HybridSystem
-from actuator.verdict.decide import decide as decide
 from actuator.verdict.log import classify_log as classify_log
 from actuator.verdict.verdict import Hunting as Hunting
 from actuator.verdict.verdict import classify as classify
+from actuator.verdict.verdict import decide as decide

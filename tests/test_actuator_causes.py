@@ -15,7 +15,7 @@ from actuator.diagnosis.candidates import candidates
 from actuator.diagnosis.causes import COUNTS, INTEGRAL, SAMPLING, STATIC, find_causes, removals
 from actuator.diagnosis.countermeasures import LADDER, find_remedies
 from actuator.diagnosis.cycle_energy import energy_per_cycle
-from actuator.verdict.decide import decide
+from actuator.verdict.verdict import decide
 from studies import load_case
 
 INPUTS = {"reference": 1.0}

@@ -6,8 +6,7 @@ from typing import Any
 from actuator.actuator import Actuator
 from actuator.simulation.run import Run
 from actuator.system.hybrid import HybridSystem
-from actuator.verdict.decide import decide
-from actuator.verdict.verdict import DIVERGING, REST, Hunting
+from actuator.verdict.verdict import DIVERGING, REST, Hunting, decide
 
 RESOLVED = 2e-3  # of the larger bound: bisection stops
 BISECTIONS = 40

@@ -9,8 +9,7 @@ from actuator.diagnosis.cycle_energy import CycleEnergy, changed_parameters, ene
 from actuator.parts.sensors import AngleSensor, CurrentSensor, Sensors
 from actuator.simulation.run import Run
 from actuator.simulation.signals import Signal
-from actuator.verdict.decide import decide
-from actuator.verdict.verdict import REST, Hunting, classify
+from actuator.verdict.verdict import REST, Hunting, classify, decide
 from controllers.cascade import Cascade, Remedies
 
 if TYPE_CHECKING:

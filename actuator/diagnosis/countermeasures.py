@@ -13,9 +13,8 @@ from actuator.diagnosis.candidates import Candidate, candidates
 from actuator.simulation.run import Run
 from actuator.simulation.signals import Signal
 from actuator.simulation.simulate import simulate
-from actuator.verdict.decide import decide
-from actuator.verdict.motion_record import trace_of
-from actuator.verdict.verdict import REST, Hunting, classify
+from actuator.verdict.motion_record import record_motion
+from actuator.verdict.verdict import REST, Hunting, classify, decide
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -70,7 +69,7 @@ class Remedy:
         """What rests stands first, then by the error, the stiction factor and the heat; the undecided stands last."""
         order = 0 if self.hunting.verdict == REST or self.forced else 1 if self.hunting.cycles else 2
         error = math.inf if math.isnan(self.error) else self.error if self.error > NOTHING else 0.0
-        heat = self.hunting.wear.mean_loss
+        heat = self.hunting.duty.mean_loss
         return order, error, -np.nan_to_num(self.stiction_factor), math.inf if math.isnan(heat) else heat
 
 
@@ -124,7 +123,7 @@ def cells(remedy: Remedy) -> tuple[str, ...]:
         _number(1e3 * remedy.error if not remedy.error < NOTHING else 0.0),
         "<= " + _number(1e3 * remedy.predicted_error) if math.isfinite(remedy.predicted_error) else "-",
         _number(1e3 * found.amplitude_rad) if found.cycles else "-",
-        _number(found.wear.mean_loss),
+        _number(found.duty.mean_loss),
         factor,
     )
 
@@ -172,7 +171,7 @@ class RemedySearch:
         # a fresh copy has no model yet, which could not be sent to another process
         whole = float(run.t[-1])
         # a motion that never stops is slow to simulate: as long as it takes to see the cycle that it should end
-        short = min(whole, float(trace_of(run).time[0]) + CYCLES * self.hunting.period_s)
+        short = min(whole, float(record_motion(run).time[0]) + CYCLES * self.hunting.period_s)
         work = [
             (each._replace(plant=replace(each.plant)), whole if math.isnan(each.forced) else short, options)
             for each in candidates(plant, run)

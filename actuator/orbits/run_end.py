@@ -22,7 +22,7 @@ def cycle_at_end(
     """
     verdict = classify(run)
     if not verdict.cycles:
-        raise NoOrbit(f"{system.name}: the run does not end in a cycle but in {verdict.verdict!r}: {verdict.reason}")
+        raise NoOrbit(f"{system.name}: the run does not end in a cycle but in '{verdict.verdict}': {verdict.reason}")
     u = system.input_vector({q.name: float(run[q.name][-1]) for q in system.inputs} | dict(inputs or {}))
     before = {q.name: float(value) for q, value in zip(system.parameters, run.parameters, strict=True)}
     return verdict.period_s, u, system.parameter_values(before | dict(parameters or {}))

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from actuator.verdict.verdict import DIVERGING, HUNTING, IRREGULAR, LIMIT_CYCLE, QUANTIZER, REST
+from actuator.verdict.verdict import DIVERGING, FAILED, HUNTING, IRREGULAR, LIMIT_CYCLE, QUANTIZER, REST, UNDECIDED
 
 if TYPE_CHECKING:
     from actuator.diagnosis.causes import Causes
@@ -21,6 +21,8 @@ VERDICT_COLORS = {
     QUANTIZER: "#8e6bb0",
     DIVERGING: "#4d4d4d",
     IRREGULAR: "#d9b44a",
+    UNDECIDED: "#f2dfa5",
+    FAILED: "#ffffff",
 }
 GIVES, TAKES = "#c0392b", "#3b75af"
 ROW = 0.32  # inch per bar
@@ -77,7 +79,7 @@ def plot_remedies(table: "RemedyTable") -> Figure:
     colors = [VERDICT_COLORS[REST if row.forced else row.hunting.verdict] for row in rows]
     columns = (
         ("largest error in mrad", [1e3 * row.error for row in rows]),
-        ("mean loss in W", [row.hunting.wear.mean_loss for row in rows]),
+        ("mean loss in W", [row.hunting.duty.mean_loss for row in rows]),
         ("stiction factor", [row.stiction_factor for row in rows]),
     )
     for axes, (label, values) in zip(panels, columns, strict=True):

@@ -16,8 +16,7 @@ from typing import Any
 
 from actuator.actuator import Actuator
 from actuator.simulation.run import Run
-from actuator.verdict.decide import decide
-from actuator.verdict.verdict import REST, Hunting
+from actuator.verdict.verdict import REST, UNDECIDED, Hunting, decide
 
 STICTION, BACKLASH, INTEGRAL = "stiction", "backlash", "integral gain"
 ENDINGS = {
@@ -30,7 +29,6 @@ LEAST, MOST = 1 / 16, 16.0  # factors that are tried: 24 dB
 RESOLVED = 0.02  # of the factor
 POINTS = 5000
 LONGEST = 16.0  # times the duration of a run: a small gain makes long periods
-MOVES = "neither repeat nor settle"  # what is said of a run that moves irregularly, with many swings
 CYCLES = 8  # periods of the last cycle that a run from it needs
 
 
@@ -86,7 +84,7 @@ def hunting_margin(  # noqa: PLR0913 - what is simulated
     duration : float
         Of the first run [s]. Those begun on a cycle last as many of its periods as a verdict needs; those that do
         not decide are gone on with, up to 16 times as long; what shows no cycle by then counts as not hunting, and
-        has the verdict "irregular" in `runs`.
+        has the verdict "undecided" in `runs`; irregular motion counts as hunting.
     compiled : bool or None
         As for `simulate`.
 
@@ -161,11 +159,11 @@ class _Trials:
         """The run, and whether it moves for ever."""
         run, verdict = self._decided(factor, begin)
         # a cycle can be lost in too long a step from the last one: in the coarse search both starts have to rest
-        if begin is not self.start and (_waits(verdict) or (self.coarse and verdict.verdict == REST)):
+        if begin is not self.start and (verdict.verdict == UNDECIDED or (self.coarse and verdict.verdict == REST)):
             other = self._decided(factor, self.start)
-            if _waits(verdict) or not _waits(other[1]):
+            if verdict.verdict == UNDECIDED or other[1].verdict != UNDECIDED:
                 run, verdict = other
-        return run, verdict.verdict != REST and not _waits(verdict)
+        return run, verdict.verdict not in (REST, UNDECIDED)
 
     def _decided(self, factor: float, begin: Mapping[str, float] | None) -> tuple[Run, Hunting]:
         """A run, gone on with where its verdict waits for a slow controller; what moves irregularly, moves."""
@@ -173,7 +171,7 @@ class _Trials:
         options = {**self.common, "parameters": {**self.others, **changed}}
         step = self.duration / POINTS
         run, verdict = decide(self.plant, self.length, longest=1.0, start=begin, resolution=step, **options)
-        if _waits(verdict):
+        if verdict.verdict == UNDECIDED:
             left = LONGEST * self.duration - self.length
             more = min(verdict.longer_s, left)
             step, begin = max(self.duration, more) / POINTS, run.state()
@@ -188,11 +186,6 @@ def hunting_margins(plant: Actuator, kinds: Sequence[str] = (STICTION, BACKLASH,
     """All margins by kind that the actuator has parameters for; options as of `hunting_margin`."""
     names = [quantity.name for quantity in plant.system().parameters]
     return {kind: hunting_margin(plant, kind, **options) for kind in kinds if _has(names, kind)}
-
-
-def _waits(verdict: Hunting) -> bool:
-    """Whether a run is too short for a verdict, and not just irregular."""
-    return not verdict.decided and MOVES not in verdict.reason
 
 
 def _has(names: Sequence[str], kind: str) -> bool:

@@ -1,22 +1,22 @@
-"""What a motion costs: reversals and travel, current and heat."""
+"""The duty of an actuator: reversals and travel, current and heat."""
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from actuator.verdict.motion_record import Trace
-from actuator.verdict.peaks import turning_points
+from actuator.verdict.motion_record import MotionRecord
+from actuator.verdict.peaks import find_turning_points
 
 HOUR = 3600.0  # s
-SWING = 0.1  # part of peak to peak that counts as a reversal
+REVERSAL_SHARE = 0.1  # part of peak to peak that counts as a reversal
 REPEATED = 3  # times a window is laid end to end: the first has no turn at its start
 UNKNOWN = float("nan")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wear:
-    """Wear and heat over a window of time; nan where a signal is not known.
+class Duty:
+    """What a motion costs over a window of time; nan where a signal is not known.
 
     Attributes
     ----------
@@ -38,19 +38,19 @@ class Wear:
     mean_loss: float = UNKNOWN
 
 
-def wear(trace: Trace, start: float, end: float) -> Wear:
-    """Wear and heat from start to end [s]; of a cycle, over whole periods."""
-    inside = trace.time[(trace.time > start) & (trace.time < end)]
+def measure_duty(record: MotionRecord, start: float, end: float) -> Duty:
+    """Duty from start to end [s]; of a cycle, over whole periods."""
+    inside = record.time[(record.time > start) & (record.time < end)]
     if not inside.size:
-        return Wear()
+        return Duty()
     time = np.array([start, *inside, end])
 
     def seen(signal: np.ndarray | None) -> np.ndarray | None:
-        return None if signal is None else np.interp(time, trace.time, signal)
+        return None if signal is None else np.interp(time, record.time, signal)
 
-    load, motor = (_motion(time, seen(signal), trace.still) for signal in (trace.load, trace.motor))
-    current, loss = seen(trace.current), seen(trace.loss)
-    return Wear(
+    load, motor = (_motion(time, seen(signal), record.still) for signal in (record.load, record.motor))
+    current, loss = seen(record.current), seen(record.loss)
+    return Duty(
         load_reversals_per_h=load[0],
         load_travel_per_h=load[1],
         motor_reversals_per_h=motor[0],
@@ -68,8 +68,8 @@ def _motion(time: np.ndarray, seen: np.ndarray | None, still: float) -> tuple[fl
     if np.ptp(seen) <= still:
         return 0.0, 0.0
     rows = [seen[1:] + k * (seen[-1] - seen[0]) for k in range(REPEATED)]
-    least = max(SWING * float(np.ptp(seen)), still)
-    turns = [len(turning_points(np.concatenate(rows[:count]), least)) for count in (1, REPEATED)]
+    least = max(REVERSAL_SHARE * float(np.ptp(seen)), still)
+    turns = [len(find_turning_points(np.concatenate(rows[:count]), least)) for count in (1, REPEATED)]
     travel = float(np.abs(np.diff(seen)).sum())
     return (turns[1] - turns[0]) / (REPEATED - 1) * float(per_hour), travel * float(per_hour)
 

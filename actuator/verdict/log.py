@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import binary_dilation, maximum_filter1d, minimum_filter1d
 
-from actuator.verdict.motion_record import Trace, last_change
-from actuator.verdict.peaks import behind_play
-from actuator.verdict.verdict import Hunting, judge
+from actuator.verdict.motion_record import MotionRecord, find_last_change
+from actuator.verdict.peaks import follow_behind_play
+from actuator.verdict.verdict import Hunting, judge_motion
 
 COLUMNS = ("time", "position", "reference", "motor position", "current")
 NEEDED = COLUMNS[:2]
@@ -61,34 +61,33 @@ def classify_log(log: str | PathLike | Mapping[str, np.ndarray], *, since: float
     """
     signals = _checked(_read(log)) if isinstance(log, str | PathLike) else _checked(dict(log))
     time, position = signals["time"], signals["position"]
-    noise = noise_of(position)
-    load, motor, reference = behind_play(position, noise.band), signals.get("motor position"), signals.get("reference")
+    noise = estimate_noise(position)
+    load = follow_behind_play(position, noise.band)
+    motor, reference = signals.get("motor position"), signals.get("reference")
     if motor is not None:
-        motor = behind_play(motor, noise_of(motor).band)
-    start = since
-    if start is None:
-        start = (
-            0.0 if reference is None else last_change(time, behind_play(reference, SIGMAS * noise_of(reference).sigma))
-        )
+        motor = follow_behind_play(motor, estimate_noise(motor).band)
+    start = 0.0 if since is None else since
+    if since is None and reference is not None:
+        start = find_last_change(time, follow_behind_play(reference, SIGMAS * estimate_noise(reference).sigma))
     keep = time >= start
-    trace = Trace(
+    record = MotionRecord(
         time=time[keep],
         load=load[keep],
         motor=None if motor is None else motor[keep],
         reference=None if reference is None else reference[keep],
         current=signals["current"][keep] if "current" in signals else None,
         loss=None,
-        standing=lambda begin, end: _standing(time, load, noise, begin, end),
+        stuck_share=lambda begin, end: _standing(time, load, noise, begin, end),
         still=noise.band,
         same=SAME,
         resolution=noise.resolution,
         note=f"what moves by less than {noise.band:.3g} rad stands, by the log's noise ({noise.sigma:.3g} rad) and "
         f"resolution ({noise.resolution:.3g} rad)",
     )
-    return judge(trace, again="log longer")
+    return judge_motion(record, again="log longer")
 
 
-def noise_of(signal: np.ndarray) -> Noise:
+def estimate_noise(signal: np.ndarray) -> Noise:
     """Noise and resolution of a measured signal: what its fourth differences and the smallest of its steps say."""
     steps = np.abs(np.diff(signal))
     least = float(steps[steps > 0].min()) if (steps > 0).any() else 0.0

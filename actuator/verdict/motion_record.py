@@ -15,7 +15,7 @@ LOSS = "_loss"  # end of the names of outputs that are heat
 
 
 @dataclass(frozen=True, kw_only=True)
-class Trace:
+class MotionRecord:
     """Motion since the inputs stopped changing.
 
     Attributes
@@ -24,7 +24,7 @@ class Trace:
         [s], [rad].
     motor, reference, current, loss : ndarray, (n,), or None
         [rad], [rad], [A], [W]; None where they are not known.
-    standing : callable
+    stuck_share : callable
         Part of the time from start to end [s] in which nothing moves.
     still : float
         Motion [rad] that is none.
@@ -33,9 +33,9 @@ class Trace:
     resolution : float
         Of a sampled position [rad at the load]; zero where it is not.
     drift : str
-        What still moves behind a standing load, in words; empty where nothing does.
-    release : float
-        Time [s] after which it lets go, at its present rate; nan where nothing moves or nothing is let go.
+        What still drifts behind a load at rest, in words; empty where nothing does.
+    breakaway : float
+        Time [s] after which a contact breaks away at the present rate; nan where none does.
     note : str
         How standing still was told from moving; empty where it is known.
     """
@@ -46,35 +46,35 @@ class Trace:
     reference: np.ndarray | None
     current: np.ndarray | None
     loss: np.ndarray | None
-    standing: Callable[[float, float], float]
+    stuck_share: Callable[[float, float], float]
     still: float = STILL
     same: float = SAME
     resolution: float = 0.0
     drift: str = ""
-    release: float = float("nan")
+    breakaway: float = float("nan")
     note: str = ""
 
 
-def trace_of(run: Run, since: float | None = None) -> Trace:
-    """The trace of a run from a time [s] on; None for the time of the last change of an input."""
+def record_motion(run: Run, since: float | None = None) -> MotionRecord:
+    """The record of a run from a time [s] on; None for the time of the last change of an input."""
     keep = run.t >= (_inputs_settled(run) if since is None else since)
     losses = [values[keep] for name, values in run.signals.items() if name.endswith(LOSS) and "." not in name]
 
     def part(name: str) -> np.ndarray | None:
         return run[name][keep] if name in run.signals else None
 
-    drift, release = _drift(run, keep)
-    return Trace(
+    drift, breakaway = _drift(run, keep)
+    return MotionRecord(
         time=run.t[keep],
         load=run["load_angle"][keep],
         motor=part("motor_angle"),
         reference=part("reference"),
         current=part("current"),
         loss=np.sum(losses, axis=0) if losses else None,
-        standing=lambda start, end: stuck_fraction(run, start, end),
+        stuck_share=lambda start, end: stuck_fraction(run, start, end),
         resolution=_resolution(run),
         drift=drift,
-        release=release,
+        breakaway=breakaway,
     )
 
 
@@ -99,12 +99,12 @@ def stuck_fraction(run: Run, start: float, end: float) -> float:
     return float(stuck / (end - start))
 
 
-def pieces(signal: np.ndarray, count: int) -> list[float]:
+def measure_swings(signal: np.ndarray, count: int) -> list[float]:
     """Peak to peak in each of `count` equal pieces."""
     return [float(np.ptp(piece)) for piece in np.array_split(signal, count)]
 
 
-def last_change(time: np.ndarray, values: np.ndarray) -> float:
+def find_last_change(time: np.ndarray, values: np.ndarray) -> float:
     """Time from which on a signal has its last value."""
     changes = np.flatnonzero(values != values[-1])
     return float(time[min(changes[-1] + 1, len(values) - 1)]) if changes.size else 0.0
@@ -112,7 +112,7 @@ def last_change(time: np.ndarray, values: np.ndarray) -> float:
 
 def _inputs_settled(run: Run) -> float:
     """Time of the last change of an input."""
-    return max((last_change(run.t, run[quantity.name]) for quantity in run.system.inputs), default=0.0)
+    return max((find_last_change(run.t, run[quantity.name]) for quantity in run.system.inputs), default=0.0)
 
 
 def _resolution(run: Run) -> float:
@@ -137,14 +137,14 @@ def _drift(run: Run, keep: np.ndarray) -> tuple[str, float]:
         return "", float("nan")
     for quantity in run.system.states:
         if quantity.name.startswith("controller."):
-            before, after = pieces(run[quantity.name][keep], QUARTERS)[2:]
+            before, after = measure_swings(run[quantity.name][keep], QUARTERS)[2:]
             if after > max(STILL * quantity.nominal, before / GROWTH):
-                drifts = f"{quantity.name} still moves, by {after:.3g} {quantity.unit} in the last quarter"
-                return drifts, _release(run, keep)
+                drifts = f"{quantity.name} still drifts: it changed by {after:.3g} {quantity.unit} in the last quarter"
+                return drifts, _time_to_breakaway(run, keep)
     return "", float("nan")
 
 
-def _release(run: Run, keep: np.ndarray) -> float:
+def _time_to_breakaway(run: Run, keep: np.ndarray) -> float:
     """When the first margin of the present modes reaches zero at its rate in the last quarter [s]; nan for never."""
     if not run.margins.size:
         return float("nan")

@@ -21,7 +21,7 @@ class Pattern(NamedTuple):
     sizes: np.ndarray  # mean swing of each period, the last one last
 
 
-def turning_points(signal: np.ndarray, least: float) -> list[int]:
+def find_turning_points(signal: np.ndarray, least: float) -> list[int]:
     """Indices at which the signal turns, each swing at least `least`; a plateau counts at its first point."""
     found, low, high, rising = [], 0, 0, None
     flat = FLAT * least
@@ -43,7 +43,7 @@ def turning_points(signal: np.ndarray, least: float) -> list[int]:
     return found
 
 
-def moments(time: np.ndarray, signal: np.ndarray, turns: list[int]) -> np.ndarray:
+def time_swings(time: np.ndarray, signal: np.ndarray, turns: list[int]) -> np.ndarray:
     """When each swing between two turning points happens: the mean of its time over its way, (turns - 1,).
 
     Standing adds no way: the first point of a plateau may be a matter of noise, this moment is not.
@@ -55,7 +55,7 @@ def moments(time: np.ndarray, signal: np.ndarray, turns: list[int]) -> np.ndarra
     return np.array(found)
 
 
-def period_of(time: np.ndarray, load: np.ndarray, start: float, end: float) -> float:
+def measure_period(time: np.ndarray, load: np.ndarray, start: float, end: float) -> float:
     """Period from upward passages of mid-swing, of about one period from `start` to `end`; that, where there are none.
 
     A passage is exact where the moment of a swing rests on where its turns are taken to be.
@@ -71,7 +71,7 @@ def period_of(time: np.ndarray, load: np.ndarray, start: float, end: float) -> f
     return float(near) if abs(near - rough) < REFINED * rough else rough
 
 
-def behind_play(signal: np.ndarray, play: float) -> np.ndarray:
+def follow_behind_play(signal: np.ndarray, play: float) -> np.ndarray:
     """What follows a signal behind a total play: still wherever the signal moves by less than it."""
     if play <= 0:
         return signal
@@ -82,7 +82,7 @@ def behind_play(signal: np.ndarray, play: float) -> np.ndarray:
     return found
 
 
-def pattern(swings: np.ndarray, times: np.ndarray, step: float, same: float) -> Pattern | None:
+def find_pattern(swings: np.ndarray, times: np.ndarray, step: float, same: float) -> Pattern | None:
     """Smallest even number of swings after which sizes and times repeat, twice over; None where they do not.
 
     `times` are those between two swings, known to `step`, the distance of the output points; sizes and times may
@@ -101,7 +101,7 @@ def pattern(swings: np.ndarray, times: np.ndarray, step: float, same: float) -> 
     return None
 
 
-def trend(sizes: np.ndarray) -> float:
+def find_trend(sizes: np.ndarray) -> float:
     """Factor per period by which swings go on shrinking or growing as a geometric row does; 1 where they do not.
 
     A transient into a cycle changes by less and less. With early and late the logarithms of the changes over the two
@@ -117,7 +117,7 @@ def trend(sizes: np.ndarray) -> float:
     return float(np.exp(late / half)) if left < math.log(DECAYED) or left > -math.log(DECAYED) else 1.0
 
 
-def limit_of(sizes: np.ndarray) -> float:
+def extrapolate_limit(sizes: np.ndarray) -> float:
     """Where a row of sizes is going, by Aitken's rule on its last three; infinity for equal steps."""
     early, late = sizes[-2] - sizes[-3], sizes[-1] - sizes[-2]
     return float(abs(sizes[-1] - late**2 / (late - early))) if late != early else float("inf")

@@ -8,7 +8,7 @@ import numpy as np
 
 from actuator import NoOrbit, SimulationError, find_orbit, follow
 from actuator.continuation.branch import BOUND
-from actuator.verdict.verdict import IRREGULAR, REST
+from actuator.verdict.verdict import CYCLES, IRREGULAR, REST, UNDECIDED
 from studies.cache import Stages
 from studies.corners import meaning
 from studies.hunting.map import Index, Plan, load, made_once, seen_at
@@ -16,7 +16,6 @@ from studies.hunting.map import Index, Plan, load, made_once, seen_at
 if TYPE_CHECKING:
     import xarray
 
-CYCLES = ("hunting", "limit cycle without sticking", "quantizer hunting")
 NO_END, GOES_ON = "no orbit", "goes on"
 
 
@@ -45,7 +44,7 @@ def crossings(plan: Plan, points: Mapping[Index, Mapping[str, Any]]) -> list[Ind
         pair = (points[index]["verdict"], points[beside]["verdict"] if beside in points else "")
         line = (index[0], index[1] if axis == "x" else index[2])
         for first, second, hunts in ((*pair, index), (*pair[::-1], beside)):
-            if first in CYCLES and second in (REST, IRREGULAR):
+            if first in CYCLES and second in (REST, IRREGULAR, UNDECIDED):
                 found.setdefault(line, hunts)
     return list(found.values())
 

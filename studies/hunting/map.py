@@ -13,8 +13,7 @@ import numpy as np
 from actuator import SimulationError
 from actuator.simulation.processes import processes
 from actuator.simulation.run import Run
-from actuator.verdict.decide import decide
-from actuator.verdict.verdict import REST, VERDICTS, Hunting
+from actuator.verdict.verdict import FAILED, REST, Hunting, Verdict, decide
 from studies.cache import Stages, actuator_of
 from studies.cases import Case, load_case
 from studies.corners import Setting, meaning, parameters_of
@@ -24,8 +23,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 Index = tuple[int, int, int]  # corner, row, column
-FAILED = "failed"  # the simulation could not be completed; the reason says why
-LABELS = (*VERDICTS, FAILED)
+LABELS = tuple(Verdict)
 POINTS = 5000  # output points of a run
 SMALL = 0.02  # part of the way gone so far: the further step that what rests is given
 LONGEST = 4.0  # times the duration that a point may take to be decided
@@ -163,17 +161,17 @@ def point(plan: Plan, index: Index) -> dict[str, Any]:
 
 
 def _numbers(hunting: Hunting) -> dict[str, float | None]:
-    wear = hunting.wear
+    duty = hunting.duty
     values = {
         "amplitude": hunting.amplitude_rad,
         "motor_amplitude": hunting.motor_amplitude_rad,
         "period": hunting.period_s,
         "stick_fraction": hunting.stick_fraction,
         "standing_error": hunting.standing_error_rad,
-        "reversals": wear.load_reversals_per_h,
-        "travel": wear.load_travel_per_h,
-        "current_rms": wear.current_rms,
-        "mean_loss": wear.mean_loss,
+        "reversals": duty.load_reversals_per_h,
+        "travel": duty.load_travel_per_h,
+        "current_rms": duty.current_rms,
+        "mean_loss": duty.mean_loss,
     }
     return {name: float(value) if math.isfinite(value) else None for name, value in values.items()}
 

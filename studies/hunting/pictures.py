@@ -10,13 +10,13 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from actuator.plots.diagnosis import VERDICT_COLORS
-from actuator.verdict.verdict import DIVERGING
-from studies.hunting.map import FAILED, LABELS
+from actuator.verdict.verdict import DIVERGING, FAILED
+from studies.hunting.map import LABELS
 
 if TYPE_CHECKING:
     import xarray
 
-COLORS = VERDICT_COLORS | {FAILED: "#ffffff"}
+COLORS = VERDICT_COLORS
 PALE = 0.45  # share of white in the fields behind the dots
 
 

@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from actuator.diagnosis.causes import INTEGRALS
+from actuator.verdict.verdict import FAILED
 from studies.cache import Stages
 from studies.corners import setting_of
 from studies.findings import Findings
 from studies.hunting.ends import CYCLES, EndPoint, along, crossings, ends, with_boundary
-from studies.hunting.map import FAILED, LABELS, Axis, Plan, compute, dataset, load
+from studies.hunting.map import LABELS, Axis, Plan, compute, dataset, load
 from studies.hunting.pictures import plot_map
 
 BREAKAWAY = ("*.breakaway", "*.static")

@@ -126,7 +126,7 @@ def _remedy(remedy: Remedy) -> dict[str, Any]:
         "error_rad": remedy.error,
         "predicted_error_rad": remedy.predicted_error,
         "amplitude_rad": found.amplitude_rad,
-        "mean_loss_W": found.wear.mean_loss,
+        "mean_loss_W": found.duty.mean_loss,
         "stiction_factor": remedy.stiction_factor,
     }
 

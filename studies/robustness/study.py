@@ -13,6 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from actuator.actuator import Actuator
+from actuator.verdict.verdict import REST
 from studies.cache import actuator_of
 from studies.cases import Case
 from studies.files import CaseError
@@ -57,7 +58,7 @@ class Shot:
 
 def hunts(result: Mapping[str, Any]) -> bool:
     """Whether a step does not come to rest: it hunts, or its run is irregular or failed."""
-    return any(verdict != "rest" for verdict in result["verdicts"])
+    return any(verdict != REST for verdict in result["verdicts"])
 
 
 def slow(result: Mapping[str, Any]) -> bool:

@@ -16,8 +16,7 @@ from actuator.simulation.simulate import simulate
 from actuator.simulation.sweep import sweep
 from actuator.stiction.margins import SLIDING, at_least_sliding
 from actuator.stiction.standstill import rest_of
-from actuator.verdict.decide import decide
-from actuator.verdict.verdict import REST, Hunting, classify
+from actuator.verdict.verdict import FAILED, REST, Hunting, classify, decide
 from studies.cache import fingerprint
 from studies.specification import Corner, Demand
 from studies.tuning.plant import defaults_of
@@ -110,7 +109,7 @@ class Bench:
         try:
             first, run, hunting = self.stepped(trial)
         except SimulationError as error:
-            return {"verdict": "failed", "reason": str(error)}
+            return {"verdict": FAILED, "reason": str(error)}
         after = first.t >= BEFORE
         current = first["current"][after] if "current" in first.signals else np.array([math.nan])
         load = first["load_angle"][after]

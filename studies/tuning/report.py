@@ -8,6 +8,7 @@ from dataclasses import asdict
 from functools import partial
 from typing import Any
 
+from actuator.verdict.verdict import REST
 from studies.cache import actuator_of
 from studies.cases import Case
 from studies.findings import Findings, rendered, versions
@@ -190,9 +191,9 @@ def _number(value: float) -> str:
 
 
 def _simulated(check: CornerCheck, factor: float, margin: StictionMargin) -> dict[str, Any]:
-    bad = sorted({verdict for verdict in check.verdicts.values() if verdict != "rest"})
+    bad = sorted({verdict for verdict in check.verdicts.values() if verdict != REST})
     return {
-        "verdict": ", ".join(bad) or "rest",
+        "verdict": ", ".join(bad) or REST,
         "good": not (check.hunts(1.0) or check.hunts(factor)),
         "cycle": f"{math.degrees(check.cycle):.3g}" if check.cycle else "",
         "error": f"{math.degrees(check.standing_error):.3g}",

@@ -17,6 +17,7 @@ from actuator.describing.describing import predicted_cycles as predicted_cycles
 from actuator.diagnosis.causes import find_causes as find_causes
 from actuator.diagnosis.countermeasures import find_remedies as find_remedies
 from actuator.diagnosis.cycle_energy import energy_per_cycle as energy_per_cycle
+from actuator.linear.bode import envelope as envelope
 from actuator.linear.margins.crossings import Margins as Margins
 from actuator.linear.margins.crossings import margins as margins
 from actuator.linear.margins.disk import DiskMargin as DiskMargin
@@ -30,7 +31,6 @@ from actuator.linear.model import linearize as linearize
 from actuator.linear.model import loop_transfer as loop_transfer
 from actuator.linear.modes import ModeModel as ModeModel
 from actuator.linear.modes import ModeModels as ModeModels
-from actuator.linear.modes import envelope as envelope
 from actuator.linear.modes import mode_models as mode_models
 from actuator.linear.operating_point import NoEquilibrium as NoEquilibrium
 from actuator.linear.operating_point import OperatingPoint as OperatingPoint

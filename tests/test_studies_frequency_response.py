@@ -20,7 +20,7 @@ from studies.cases import load_case
 from studies.files import CaseError
 from studies.frequency.bench import TESTS, BenchPlan
 from studies.frequency.corners import WrongRequest
-from studies.frequency.mask import Limit, checked, load_mask, phase_of
+from studies.frequency.mask import Limit, checked, load_mask
 from studies.frequency.page import _assumed
 from studies.frequency.plan import PARTS, load_positioner
 from studies.frequency.tables import write_netcdf
@@ -369,11 +369,6 @@ def test_what_does_not_move_or_has_failed_keeps_to_no_lower_limit():
         checks = checked(limit, np.array([1.0, 2.0]), np.array([value, 1.0], complex), np.array(moves))
         assert [check.slack for check in checks] == [-math.inf, -math.inf]
         assert [check.nothing for check in checks] == [words, words]
-
-
-def test_phase_starts_between_minus_270_and_90_deg_and_has_no_jumps():
-    phases = np.radians([-170.0, -190.0, -350.0])
-    np.testing.assert_allclose(phase_of(np.exp(1j * phases), np.ones(3, bool)), phases)
 
 
 def test_the_built_in_mask_is_read():

@@ -3,13 +3,13 @@
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import control
 import numpy as np
 
 from actuator.actuator import Actuator
-from actuator.linear.margins.crossings import CUT, SLOW, Margins, margins
+from actuator.linear.margins.crossings import Margins, margins
 from actuator.linear.model import linearize, loop_transfer
 from actuator.linear.operating_point import MOTIONS, NoEquilibrium, OperatingPoint
 from actuator.linear.sampled import without_counts
@@ -20,19 +20,6 @@ from gear.quantities import require_known
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-FREQUENCIES = 2 * np.pi * np.logspace(-2, 4, 1500)  # rad/s
-HIGHEST_PHASE = 0.5 * np.pi  # at which a loop may start; the lowest is a turn below
-
-
-class Envelope(NamedTuple):
-    """Between which gains [-] and phases [rad] all modes in which anything passes lie, over frequency [rad/s]."""
-
-    frequencies: np.ndarray
-    gain_low: np.ndarray
-    gain_high: np.ndarray
-    phase_low: np.ndarray
-    phase_high: np.ndarray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -198,34 +185,3 @@ def _in_gap(model: ModeModel, name: str) -> ModeModel:
     m = np.array([changed.get(mode, value) for mode, value in zip(point.system.modes, point.m, strict=True)])
     flight = OperatingPoint(system=point.system, x=point.x, m=m, u=point.u, p=point.p, rates=point.rates)
     return ModeModel(name=f"{model.name}, {FREE} {_short([name])}", point=flight, equilibrium=False)
-
-
-def bode(model: control.StateSpace, frequencies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Gain [-] and unwrapped phase [rad] of a response, the phase starting between -270 and +90 deg."""
-    point = np.exp(1j * frequencies * model.dt) if model.dt else 1j * frequencies
-    values = np.asarray(model(point))
-    phase = np.unwrap(np.angle(values))
-    turns = np.ceil((phase[0] - HIGHEST_PHASE) / (2 * np.pi))
-    return abs(values), phase - 2 * np.pi * turns
-
-
-def passes(model: control.StateSpace) -> bool:
-    """Whether anything passes a model: a stuck gear passes nothing on, but for rounding."""
-    end = np.pi / model.dt if model.dt else np.inf
-    grid = FREQUENCIES[(FREQUENCIES > SLOW) & (end > FREQUENCIES)]
-    return bool(bode(model, grid)[0].max() > CUT)
-
-
-def envelope(models: Mapping[str, control.StateSpace], frequencies: np.ndarray = FREQUENCIES) -> Envelope:
-    """Between which gains and phases the models lie in which anything passes.
-
-    Raises
-    ------
-    ValueError
-        Where nothing passes in any of them.
-    """
-    seen = [bode(model, frequencies) for model in models.values() if passes(model)]
-    if not seen:
-        raise ValueError(f"nothing passes in any of the modes {', '.join(models)}: there is no envelope")
-    gains, phases = (np.array(rows) for rows in zip(*seen, strict=True))
-    return Envelope(frequencies, gains.min(axis=0), gains.max(axis=0), phases.min(axis=0), phases.max(axis=0))

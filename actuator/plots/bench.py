@@ -7,6 +7,7 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
+from actuator.linear.bode import phase_of
 from actuator.plots.response import plain_hertz
 from actuator.plots.runs import DEGREES
 
@@ -35,9 +36,7 @@ def plot_stiffness(found: "DynamicStiffness", **where: Any) -> Figure:
             size.plot([], [], color=color, label=f"{label}: no motion")
             continue
         values = np.where(moves, one.stiffness.values, np.nan)
-        angle = np.full(len(values), np.nan)
-        angle[moves] = np.unwrap(np.angle(values[moves]))
-        for axes, row in ((size, abs(values)), (phase, DEGREES * angle)):
+        for axes, row in ((size, abs(values)), (phase, DEGREES * phase_of(values, moves))):
             axes.plot(hertz, row, color=color, linewidth=1.2, label=label)
             axes.plot(hertz[settled], row[settled], "o", color=color, markersize=3)
             axes.plot(hertz[~settled], row[~settled], "o", color=color, markersize=4, mfc="w")

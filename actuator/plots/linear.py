@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
+from actuator.linear.bode import FREQUENCIES, bode_of, envelope, passes, phase_of, to_db
 from actuator.linear.margins.crossings import margins
-from actuator.linear.modes import FREQUENCIES, bode, envelope, passes
 from actuator.plots.runs import DEGREES
 
 LINE_COLORS = {"stuck": "#4d4d4d", "forward": "#3b75af", "backward": "#e1812c"}
@@ -49,7 +49,7 @@ def draw_modes(
     if open_modes:
         band = envelope(open_modes, frequencies)
         for axes, low, high in (
-            (gain, decibel(band.gain_low), decibel(band.gain_high)),
+            (gain, to_db(band.gain_low), to_db(band.gain_high)),
             (phase, DEGREES * band.phase_low, DEGREES * band.phase_high),
         ):
             # with an edge: modes often lie on each other
@@ -63,14 +63,9 @@ def draw_modes(
     for k, (name, model) in enumerate(open_modes.items() if lines else ()):
         color = LINE_COLORS.get(name, f"C{(k + 2) % 10}")
         style = LINE_STYLES.get(name.partition(",")[0], "-")
-        size, angle = bode(model, frequencies)
-        gain.semilogx(hertz, decibel(size), color=color, linestyle=style, linewidth=1.2, label=name)
+        size, angle = bode_of(model, frequencies)
+        gain.semilogx(hertz, to_db(size), color=color, linestyle=style, linewidth=1.2, label=name)
         phase.semilogx(hertz, DEGREES * angle, color=color, linestyle=style, linewidth=1.2)
-
-
-def decibel(size: np.ndarray) -> np.ndarray:
-    """20 log10, of nothing a very small number."""
-    return 20 * np.log10(np.maximum(size, np.finfo(float).tiny))
 
 
 def plot_bode(loops: Mapping[str, control.StateSpace], title: str, frequencies_hz: np.ndarray | None = None) -> Figure:
@@ -87,10 +82,8 @@ def plot_bode(loops: Mapping[str, control.StateSpace], title: str, frequencies_h
             gain.plot([], [], color=color, label=f"{mode}: nothing passes")
             continue
         label = f"{mode}: gain margin {found.gain_db:.1f} dB, phase margin {np.degrees(found.phase_rad):.0f} deg"
-        gain.semilogx(hertz, 20 * np.log10(abs(response)), color=color, linestyle=style, label=label)
-        angle = np.degrees(np.unwrap(np.angle(response)))
-        angle -= 360 * np.round((angle[0] + 90) / 360)  # a loop starts between +90 and -270 deg
-        phase.semilogx(hertz, angle, color=color, linestyle=style)
+        gain.semilogx(hertz, to_db(abs(response)), color=color, linestyle=style, label=label)
+        phase.semilogx(hertz, DEGREES * phase_of(response), color=color, linestyle=style)
         if np.isfinite(found.phase_rad):
             gain.axvline(found.phase_frequency / (2 * np.pi), color=color, linestyle=":", linewidth=0.8)
     gain.axhline(0, color="k", linewidth=0.8)

@@ -11,7 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, MultipleLocator, NullFormatter
 
-from actuator.plots.linear import decibel, draw_modes
+from actuator.linear.bode import phase_of, to_db
+from actuator.plots.linear import draw_modes
 from actuator.plots.runs import DEGREES
 
 if TYPE_CHECKING:
@@ -44,8 +45,8 @@ def plot_responses(
         clear = spectrum.coherence >= CLEAR
         hertz, response = spectrum.frequencies[clear], spectrum.response[clear]
         if clear.any():
-            angle = DEGREES * _unwrapped(response, np.ones(len(response), bool))
-            for axes, values in ((gain, decibel(abs(response))), (phase, angle)):
+            angle = DEGREES * phase_of(response)
+            for axes, values in ((gain, to_db(abs(response))), (phase, angle)):
                 axes.plot(hertz, values, ".", color=f"C{k + 1}", markersize=4, label=spectrum.label)
     output = str(where.get("output", measured.data.output.values[0])).replace("_", " ")
     gain.set_title(f"{output} over {measured.given.replace('_', ' ')}; {READING}", fontsize="medium")
@@ -78,8 +79,8 @@ def draw_responses(
         if not moves.any():
             gain.plot([], [], color=color, label=label + (STILL if known.any() else FAILED))
             continue
-        size = np.where(moves, decibel(abs(response)), np.nan)
-        angle = np.where(moves, _unwrapped(response, moves), np.nan)
+        size = np.where(moves, to_db(abs(response)), np.nan)
+        angle = phase_of(response, moves)
         top, bottom = max(top, np.nanmax(size)), min(bottom, np.nanmin(size))
         for axes, values in ((gain, size), (phase, DEGREES * angle)):
             _draw_points(axes, frequencies, values, settled, color, label)
@@ -161,8 +162,8 @@ def plot_spectrum(spectrum: "Spectrum") -> Figure:
     """Gain, phase and coherence over frequency."""
     figure = Figure(figsize=(9, 7), layout="constrained")
     panels = figure.subplots(3, 1, sharex=True, height_ratios=(2, 2, 1))
-    phase = DEGREES * _unwrapped(spectrum.response, np.ones(len(spectrum.response), bool))
-    rows = (decibel(abs(spectrum.response)), phase, spectrum.coherence)
+    phase = DEGREES * phase_of(spectrum.response)
+    rows = (to_db(abs(spectrum.response)), phase, spectrum.coherence)
     for axes, values, label in zip(panels, rows, ("gain in dB", "phase in deg", "coherence"), strict=True):
         axes.semilogx(spectrum.frequencies, values, linewidth=1.2)
         axes.set_ylabel(label)
@@ -172,11 +173,3 @@ def plot_spectrum(spectrum: "Spectrum") -> Figure:
     panels[2].set_xlabel("frequency in Hz")
     panels[0].set_title(spectrum.label, fontsize="medium")
     return figure
-
-
-def _unwrapped(response: np.ndarray, moves: np.ndarray) -> np.ndarray:
-    """Phase [rad] without jumps where there is a response."""
-    angle = np.zeros(len(response))
-    angle[moves] = np.unwrap(np.angle(response[moves]))
-    first = angle[moves][0]
-    return angle - 2 * np.pi * np.ceil((first - np.pi / 2) / (2 * np.pi))

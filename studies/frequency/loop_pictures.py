@@ -8,8 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from actuator.linear.bode import to_db
 from actuator.linear.margins.sensitivity import Peak, Sensitivities
-from actuator.plots.linear import EDGE, LINE_COLORS, LINE_STYLES, MOST_NAMES, SHADE, decibel, plot_modes
+from actuator.plots.linear import EDGE, LINE_COLORS, LINE_STYLES, MOST_NAMES, SHADE, plot_modes
 from actuator.simulation.run import FREE
 
 LEAST_DB = -60.0  # that is shown of a sensitivity
@@ -28,13 +29,13 @@ def plot_sensitivities(found: Mapping[str, Sensitivities | None], title: str) ->
     ):
         curves = {mode: ((each.sensitivity, each.complementary)[index]) for mode, each in passing.items()}
         hertz = next(iter(passing.values())).frequencies / (2 * np.pi)
-        sizes = decibel(np.array(list(curves.values())))
+        sizes = to_db(np.array(list(curves.values())))
         axes.fill_between(
             hertz, sizes.min(axis=0), sizes.max(axis=0), facecolor=SHADE, edgecolor=EDGE, linewidth=2,
             label="envelope of the linear modes",
         )  # fmt: skip
         for k, (mode, curve) in enumerate(curves.items()):
-            axes.semilogx(hertz, decibel(curve), linewidth=1.2, label=mode, **_style(mode, k))
+            axes.semilogx(hertz, to_db(curve), linewidth=1.2, label=mode, **_style(mode, k))
         peaks = {mode: (each.sensitivity_peak, each.complementary_peak)[index] for mode, each in passing.items()}
         _mark(axes, peaks, ("$M_S$ = {:.3g}", "$M_T$ = {:.3g}")[index])
         axes.set_ylabel(name)
@@ -70,7 +71,7 @@ def _mark(axes: Axes, peaks: Mapping[str, Peak], words: str) -> None:
     value, frequency = peaks[mode]
     if math.isnan(frequency):
         return
-    hertz, height = frequency / (2 * math.pi), 20 * math.log10(value)
+    hertz, height = frequency / (2 * math.pi), to_db(value)
     axes.plot([hertz], [height], "o", color=PEAK_COLOR, markersize=5, zorder=5)
     axes.annotate(
         f"{words.format(value)} at {hertz:.3g} Hz, {mode}", (hertz, height), xytext=(0, 7), textcoords="offset points",

@@ -10,6 +10,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from annotated_types import Unit
 
+from actuator.linear.bode import phase_of, to_db
 from studies.files import read
 from studies.structure import structure
 
@@ -140,7 +141,7 @@ def checked(limit: Limit, frequencies: np.ndarray, response: np.ndarray, moves: 
     inside = (frequencies >= limit.frequencies[0]) & (frequencies <= limit.frequencies[-1])
     phase = phase_of(response, moves)
     gain = np.full(len(response), -np.inf)
-    gain[moves] = 20 * np.log10(abs(response[moves]))
+    gain[moves] = to_db(abs(response[moves]))
     found = []
     for side, sign in SIDES.items():
         if not getattr(limit, side):
@@ -154,13 +155,3 @@ def checked(limit: Limit, frequencies: np.ndarray, response: np.ndarray, moves: 
         failed = int((~np.isfinite(response[inside])).sum())
         found.append(LimitCheck(limit.amplitude, side, float(slack[worst]), at, int(inside.sum()), failed))
     return found
-
-
-def phase_of(response: np.ndarray, moves: np.ndarray) -> np.ndarray:
-    """Phase [rad] without jumps, starting between -270 and +90 deg; nan where nothing moves."""
-    known = moves & np.isfinite(response)
-    angle = np.full(len(response), np.nan)
-    if known.any():
-        angle[known] = np.unwrap(np.angle(response[known]))
-        angle -= 2 * np.pi * np.ceil((angle[known][0] - np.pi / 2) / (2 * np.pi))
-    return angle

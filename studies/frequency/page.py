@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from actuator import FrequencyResponse, LiftedMargins, Margins, Poles, Sensors, Spectrum
+from actuator.linear.bode import to_db
 from actuator.linear.margins.sensitivity import Peak, Sensitivities
 from gear import Backlash
 from studies.findings import rendered
@@ -285,9 +286,7 @@ def _margin(found: Margins | LiftedMargins, mode: str, curves: Sensitivities) ->
     peaks = [at_peak(curves.sensitivity_peak), at_peak(curves.complementary_peak)]
     closed = "stable" if found.stable else "unstable"
     if isinstance(found, LiftedMargins):
-        low, high = (
-            20 * math.log10(value) if value > 0 else -math.inf for value in (found.lower_gain, found.upper_gain)
-        )
+        low, high = (to_db(value) for value in (found.lower_gain, found.upper_gain))
         gain = f"{number(low)} to {number(high)}"
         cells = [gain, number(math.degrees(found.phase_rad)), "–", "–", *peaks]
         return {
@@ -308,9 +307,7 @@ def _margin(found: Margins | LiftedMargins, mode: str, curves: Sensitivities) ->
         f"{c.frequency / (2 * math.pi):.4g} Hz: {math.degrees(c.phase_rad):.1f}°, {1e3 * c.delay_s:.3g} ms"
         for c in found.gain_crossings
     )
-    phases = "; ".join(
-        f"{c.frequency / (2 * math.pi):.4g} Hz: {20 * math.log10(c.gain):+.1f} dB" for c in found.phase_crossings
-    )
+    phases = "; ".join(f"{c.frequency / (2 * math.pi):.4g} Hz: {to_db(c.gain):+.1f} dB" for c in found.phase_crossings)
     return {"mode": mode, "closed": closed, "cells": cells, "gains": gains or "–", "phases": phases or "–"}
 
 

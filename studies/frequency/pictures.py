@@ -10,9 +10,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from actuator import Spectrum
+from actuator.linear.bode import phase_of, to_db
 from actuator.plots.response import FAILED, READING, STILL, draw_responses, plain_hertz
 from studies.frequency.corners import Place
-from studies.frequency.mask import Mask, phase_of
+from studies.frequency.mask import Mask
 from studies.frequency.study import Study
 
 LIMIT_COLOR = "#c0392b"
@@ -96,7 +97,7 @@ def plot_beside(studies: Sequence[Study], amplitudes: Sequence[float]) -> Figure
             word = "" if moves.any() else STILL if known.any() else FAILED
             label = f"{name}, {math.degrees(amplitude):.3g} deg{word}"
             size = np.full(len(hertz), np.nan)
-            size[moves] = 20 * np.log10(abs(response[moves]))
+            size[moves] = to_db(abs(response[moves]))
             angle = np.degrees(phase_of(response, moves))
             for axes, values in ((gain, size), (phase, angle)):
                 axes.semilogx(hertz, values, style, color=f"C{k}", marker=".", linewidth=1.2, label=label)

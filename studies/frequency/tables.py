@@ -11,6 +11,7 @@ import numpy as np
 import xarray
 
 from actuator import LiftedMargins
+from actuator.linear.bode import to_db
 from studies.frequency.plan import Plan
 from studies.frequency.study import Study
 
@@ -45,7 +46,7 @@ def response_rows(plan: Plan, studies: Sequence[Study]) -> Iterable[Sequence[Any
                 amplitude,
                 amplitude / plan.stroke,
                 frequency,
-                20 * math.log10(abs(value)) if moves and value else "",
+                to_db(abs(value)) if moves and value else "",
                 math.degrees(math.atan2(value.imag, value.real)) if moves else "",
                 float(one["mean"]),
                 *(harmonics[k - 1] / harmonics[0] if moves else "" for k in HARMONICS),
@@ -101,7 +102,7 @@ def margin_rows(studies: Sequence[Study]) -> Iterable[Sequence[Any]]:
                     yield (*start, "phase margin", hertz, math.degrees(gain.phase_rad), "deg")
                     yield (*start, "delay margin", hertz, gain.delay_s, "s")
                 for phase in found.phase_crossings:
-                    yield (*start, "gain margin", phase.frequency / (2 * math.pi), 20 * math.log10(phase.gain), "dB")
+                    yield (*start, "gain margin", phase.frequency / (2 * math.pi), to_db(phase.gain), "dB")
                 yield (*start, "disk size", found.disk.frequency / (2 * math.pi), found.disk.size, "-")
         for at, modes in study.linear.sensitivities.items():
             for mode, each in modes.items():

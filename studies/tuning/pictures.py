@@ -5,6 +5,7 @@ import math
 import numpy as np
 from matplotlib.figure import Figure
 
+from actuator.linear.bode import phase_of, to_db
 from actuator.simulation.signals import Step
 from actuator.simulation.simulate import simulate
 from actuator.stiction.standstill import rest_of
@@ -72,9 +73,8 @@ def loops_picture(tuned: Tuned) -> Figure:
                 curves = curves_at(moved(modes.points[mode], gains), gains)
                 for column, at in enumerate(opened):
                     hertz, loop = curves.frequencies(at) / (2 * math.pi), curves.loop(at)
-                    panels[0, column].semilogx(hertz, 20 * np.log10(abs(loop)), color=color, lw=1, label=label)
-                    phase = np.degrees(np.unwrap(np.angle(loop)))
-                    panels[1, column].semilogx(hertz, phase - 360 * np.ceil((phase[0] - 90) / 360), color=color, lw=1)
+                    panels[0, column].semilogx(hertz, to_db(abs(loop)), color=color, lw=1, label=label)
+                    panels[1, column].semilogx(hertz, np.degrees(phase_of(loop)), color=color, lw=1)
     for column, at in enumerate(opened):
         panels[0, column].set_title(f"opened at {at.replace('_', ' ')}", fontsize="medium")
         panels[0, column].axhline(0, color="#888888", lw=1)

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import control
 import numpy as np
 
+from actuator.linear.bode import FREQUENCIES
 from actuator.linear.margins.crossings import CUT, SLOW
 from actuator.linear.model import linearize, loop_transfer
-from actuator.linear.modes import FREQUENCIES
 from actuator.linear.operating_point import OperatingPoint
 
 

@@ -1,8 +1,9 @@
 """One actuator: motor, inverter, controller, gear and load, composed into a HybridSystem."""
 
+import pickle  # of its own fields
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property, lru_cache
 from typing import Any
 
 import casadi as ca
@@ -32,6 +33,7 @@ from gear.transmission import Transmission
 SPEED = 0.1  # rad/s, a usual size
 PARTS = ("controller", "sampling", "sensors", "link", "inverter", "motor", "thermal", "gear", "load")
 SAME_RATIO = 1e-9
+MOST_BUILT = 16  # actuators that a process keeps of those that came from another one
 SHARED = {"cse": True}  # what several laws work out is worked out once: a fifth of all operations
 
 
@@ -104,11 +106,20 @@ class Actuator:
     def _assembly(self) -> "_Assembly":
         return _Assembly(self)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Without its model, which cannot travel; what arrives more than once in a process is one actuator there."""
+        return _arrived, (pickle.dumps({each.name: getattr(self, each.name) for each in fields(self)}),)
+
     def __hash__(self) -> int:
         return id(self)
 
     def __eq__(self, other: object) -> bool:
         return self is other
+
+
+@lru_cache(maxsize=MOST_BUILT)
+def _arrived(packed: bytes) -> Actuator:
+    return Actuator(**pickle.loads(packed))  # packed by an actuator
 
 
 class _Assembly:

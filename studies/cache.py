@@ -11,8 +11,7 @@ import os
 import tempfile
 import threading
 from collections.abc import Callable, Iterable, Iterator, MutableMapping
-from concurrent.futures import Executor, Future
-from functools import cache, partial
+from functools import cache
 from importlib import metadata, resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -184,47 +183,40 @@ class Stages:
         """Keep a part under a name."""
         self._kept[self._key(name)] = {"part": CONVERTER.unstructure(part)}
 
-    def __contains__(self, name: str) -> bool:
+    def of(self, kind: type[T]) -> MutableMapping[str, T]:
+        """Parts of a type by name, as the `done` of `run_many`."""
+        return _Parts(self, kind)
+
+    def __contains__(self, name: object) -> bool:
         return self._key(name) in self._kept
 
-    def _key(self, name: str) -> str:
+    def _key(self, name: object) -> str:
         return f"{name}, {self._of}"
 
 
-class KeepingExecutor(Executor):
-    """Gives another executor the work that is not kept, and keeps what comes of it as soon as it is there.
+class _Parts(MutableMapping[str, T]):
+    """Parts of one type, as whoever makes many of them reads and writes them."""
 
-    Parameters
-    ----------
-    executor : Executor
-        What works.
-    stages : Stages
-        Where it is kept, as "`name` 1", "`name` 2", ...
-    name : str
-        What each piece of work gives.
-    kind : type
-        The type of that.
-    """
+    def __init__(self, stages: Stages, kind: type[T]) -> None:
+        self._stages, self._kind, self._made = stages, kind, set()
 
-    def __init__(self, executor: Executor, stages: Stages, name: str, kind: type) -> None:
-        self._executor, self._stages, self._name, self._kind = executor, stages, name, kind
+    def __contains__(self, name: object) -> bool:
+        return name in self._stages
 
-    def map(self, fn: Callable[..., Any], *iterables: Iterable, **options: Any) -> Iterator[Any]:
-        """As of an Executor; what is not kept begins at once."""
-        begun: list[tuple[str, Future | None]] = []
-        for k, arguments in enumerate(zip(*iterables, strict=True)):
-            name = f"{self._name} {k + 1}"
-            begun.append((name, None if name in self._stages else self._executor.submit(fn, *arguments)))
-            if (future := begun[-1][1]) is not None:
-                future.add_done_callback(partial(self._keep, name))
-        return (self._result(name, future) for name, future in begun)
-
-    def _keep(self, name: str, future: Future) -> None:
-        if not future.cancelled() and future.exception() is None:
-            self._stages.keep(name, future.result())
-
-    def _result(self, name: str, future: Future | None) -> Any:
-        if future is not None:
-            return future.result()
-        self._stages.taken.append(name)
+    def __getitem__(self, name: str) -> T:
+        if name not in self._made:
+            self._stages.taken.append(name)
         return self._stages.read(name, self._kind)
+
+    def __setitem__(self, name: str, part: T) -> None:
+        self._made.add(name)
+        self._stages.keep(name, part)
+
+    def __delitem__(self, name: str) -> None:
+        raise TypeError(f"{name}: what is kept is not taken back")
+
+    def __iter__(self) -> Iterator[str]:
+        raise TypeError("what is kept is asked for by name")
+
+    def __len__(self) -> int:
+        raise TypeError("what is kept is asked for by name")

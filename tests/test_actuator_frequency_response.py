@@ -37,7 +37,6 @@ from actuator import (
 from actuator.response.fourier import fourier
 from actuator.response.frequency_response import point_key
 from actuator.response.sine import SinePoint
-from actuator.simulation.sweep import sweep
 from controllers import PID, Sampling
 from gear import Bearing, KnownOil, OilAt, Shaft, Thickening, Transmission
 
@@ -305,30 +304,6 @@ def test_another_law_is_another_point_of_an_actuator_and_of_a_bare_system():
     keys = [point_key(SineStream(plant=each), point) for each in (first, again, *others)]
     assert keys[0] == keys[1]
     assert len(set(keys)) == 1 + len(others)
-
-
-def square(value):
-    return {"square": value**2}
-
-
-def test_a_sweep_over_processes_keeps_its_order_and_its_progress():
-    seen = []
-    found = sweep(square, {str(k): k for k in range(8)}, workers=2, progress=lambda k, n: seen.append((k, n)))
-    assert list(found) == [str(k) for k in range(8)]
-    assert [result["square"] for result in found.values()] == [k**2 for k in range(8)]
-    assert seen == [(k, 8) for k in range(1, 9)]
-
-
-def fails(value):
-    raise RuntimeError(f"no {value}")
-
-
-@pytest.mark.parametrize("workers", [1, 2])
-def test_a_sweep_that_fails_keeps_what_is_done(workers):
-    done = {"0": {"square": 0}}
-    with pytest.raises(RuntimeError, match="no 1"):
-        sweep(fails, {"0": 0, "1": 1}, done=done, workers=workers)
-    assert done == {"0": {"square": 0}}
 
 
 # -- broadband ----------------------------------------------------------------------------------------------

@@ -1,16 +1,11 @@
-"""What studies keep: the file, the parts of a study, and the processes that make them.
+"""What studies keep: the file, and the parts of a study.
 
 Oracles: what was put in comes out, to the last bit, from another mapping over the same file; a file cut anywhere, as a
-kill leaves it, gives the lines that are whole; another program's file gives nothing; processes that are told to sleep
-for an hour are gone when their pool is left.
+kill leaves it, gives the lines that are whole; another program's file gives nothing.
 """
 
 import json
 import math
-import multiprocessing
-import os
-import time
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -23,8 +18,8 @@ from hypothesis import strategies as st
 import actuator
 from actuator import SinePoint, SineStream
 from actuator.response.frequency_response import point_key
-from actuator.simulation.processes import processes
-from studies.cache import FILE, PACKAGES, KeepingExecutor, Kept, Missing, Stages, actuator_of, kept_in, program, source
+from actuator.simulation.many import run_many
+from studies.cache import FILE, PACKAGES, Kept, Missing, Stages, actuator_of, kept_in, program, source
 from studies.cases import load_case
 
 # -- the file -----------------------------------------------------------------------------------------------
@@ -188,37 +183,15 @@ def test_a_failure_is_kept_like_a_result_and_others_go_through(tmp_path):
     assert "another" not in Stages(Kept(tmp_path / FILE))
 
 
-def test_work_of_an_executor_is_kept_as_it_comes_even_where_nobody_asks_for_it(tmp_path):
-    done = []
-
-    def work(item):
-        done.append(item)
-        if item == 3:
-            raise ValueError("three")
-        return item / 2
-
-    for items, new in (([1, 2], [1, 2]), ([1, 2, 3], [3]), ([1, 2, 4], [4])):
-        done.clear()
-        stages = Stages(Kept(tmp_path / FILE), "case")
-        with ThreadPoolExecutor(1) as pool:
-            found = KeepingExecutor(pool, stages, "half", float).map(work, items)
-        assert done == new
-        if 3 in items:
-            with pytest.raises(ValueError, match="three"):
-                list(found)
-        else:
-            assert list(found) == [item / 2 for item in items]
+def test_many_parts_of_a_type_are_a_mapping_that_says_which_were_there(tmp_path):
+    stages = Stages(Kept(tmp_path / FILE), "case")
+    assert run_many(half, {"half 1": 1, "half 2": 2}, done=stages.of(float), workers=1) == {"half 1": 0.5, "half 2": 1}
+    assert stages.taken == []
+    again = Stages(Kept(tmp_path / FILE), "case")
+    found = run_many(half, {"half 2": 2, "half 3": 3}, done=again.of(float), workers=1)
+    assert found == {"half 2": 1.0, "half 3": 1.5}
+    assert again.taken == ["half 2"]
 
 
-# -- processes ----------------------------------------------------------------------------------------------
-
-
-def test_processes_end_in_the_middle_of_their_work_where_the_pool_is_left_by_an_exception():
-    with pytest.raises(KeyboardInterrupt), processes(1) as pool:
-        pid = pool.submit(os.getpid).result()
-        assert pid in [child.pid for child in multiprocessing.active_children()]
-        pool.submit(time.sleep, 3600)
-        raise KeyboardInterrupt
-    assert pid not in [child.pid for child in multiprocessing.active_children()]
-    with pytest.raises(ProcessLookupError):
-        os.kill(pid, 0)
+def half(item):
+    return item / 2

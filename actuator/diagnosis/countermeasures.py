@@ -1,15 +1,16 @@
 """What helps against hunting: every remedy that suits the controller, simulated and ranked."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, MutableMapping
 from concurrent.futures import Executor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from actuator.actuator import Actuator
 from actuator.diagnosis.candidates import Candidate, candidates
+from actuator.simulation.many import run_many, submit_many
 from actuator.simulation.run import Run
 from actuator.simulation.signals import Signal
 from actuator.simulation.simulate import simulate
@@ -147,6 +148,8 @@ class RemedySearch:
         As for `simulate`.
     executor : Executor or None
         Begins to run the remedies at once, side by side; None for one after another, in `finish`.
+    done : mutable mapping of str to Remedy or None
+        As for `run_many`, by "remedy 1", "remedy 2", ...
 
     Raises
     ------
@@ -163,29 +166,36 @@ class RemedySearch:
         resolution: float | None = None,
         compiled: bool | None = None,
         executor: Executor | None = None,
+        done: MutableMapping[str, Remedy] | None = None,
     ) -> None:
         self.hunting = classify(run)
         if not self.hunting.cycles:
             raise ValueError(f"{plant.name}: nothing to remedy: {self.hunting.verdict}, {self.hunting.reason}")
         options = {"inputs": inputs, "resolution": resolution, "compiled": compiled}
-        # a fresh copy has no model yet, which could not be sent to another process
         whole = float(run.t[-1])
         # a motion that never stops is slow to simulate: as long as it takes to see the cycle that it should end
         short = min(whole, float(record_motion(run).time[0]) + CYCLES * self.hunting.period_s)
-        work = [
-            (each._replace(plant=replace(each.plant)), whole if math.isnan(each.forced) else short, options)
-            for each in candidates(plant, run)
-        ]
-        self.count = len(work)
-        self._found = map(_tried, work) if executor is None else executor.map(_tried, work)
+        self._work: dict[str, _Work] = {
+            f"remedy {k}": (each, whole if math.isnan(each.forced) else short, options)
+            for k, each in enumerate(candidates(plant, run), 1)
+        }
+        self._done = {} if done is None else done
+        self._begun = submit_many(_try_remedy, self._work, executor, done=self._done) if executor else None
 
     def finish(self, progress: Callable[[float], None] | None = None) -> RemedyTable:
         """The table, once all are tried; `progress` is called with the share that is done."""
-        tried: list[Remedy] = []
-        for remedy in self._found:
-            tried.append(remedy)
+
+        def tell(finished: int, count: int) -> None:
             if progress is not None:
-                progress(len(tried) / self.count)
+                progress(finished / count)
+
+        if self._begun is None:
+            tried = list(run_many(_try_remedy, self._work, done=self._done, workers=1, progress=tell).values())
+        else:
+            tried = []
+            for future in self._begun.values():
+                tried.append(future.result())
+                tell(len(tried), len(self._work))
         before = Remedy(name="as it is", setting="", predicted_error=UNKNOWN, hunting=self.hunting, stiction_factor=0.0)
         return RemedyTable(before=before, ranked=tuple(sorted(tried, key=lambda remedy: remedy.rank)))
 
@@ -195,12 +205,12 @@ def find_remedies(plant: Actuator, run: Run, **options: Any) -> RemedyTable:
     return RemedySearch(plant, run, **options).finish()
 
 
-_built: dict[str, Actuator] = {}  # in each process: an actuator comes by value, and its model is to be built once
+_Work = tuple[Candidate, float, dict[str, Any]]
 
 
-def _tried(work: tuple[Candidate, float, dict[str, Any]]) -> Remedy:
+def _try_remedy(work: _Work) -> Remedy:
     candidate, duration, options = work
-    plant, parameters = _built.setdefault(repr(candidate.plant), candidate.plant), candidate.parameters
+    plant, parameters = candidate.plant, candidate.parameters
     first = decide(plant, duration, parameters=parameters, **options).hunting
     periods = first.period_s / candidate.forced
     forced = bool(0.5 < periods < MOST_FORCED and abs(periods - round(periods)) < SAME * periods)  # noqa: PLR2004

@@ -13,7 +13,7 @@ import xarray
 
 from actuator.actuator import Actuator
 from actuator.response.sine import SinePoint, SineResponse, SineStream
-from actuator.simulation.sweep import sweep
+from actuator.simulation.many import run_many
 from actuator.system.hybrid import HybridSystem
 from gear.lubrication.lubricant import at_temperature
 
@@ -152,7 +152,7 @@ def frequency_response(  # noqa: PLR0913 - an experiment has this many choices, 
     compiled : bool or None
         As for `simulate`.
     workers, done, progress
-        As for `sweep`: processes; finished points by key; what is called with the numbers of finished and all points.
+        As for `run_many`: processes, finished points by key, and what is told how many are finished.
 
     Returns
     -------
@@ -190,7 +190,7 @@ def frequency_response(  # noqa: PLR0913 - an experiment has this many choices, 
             amplitude=float(amplitude), frequency=float(frequency), inputs=biased, parameters=dict(sets[name])
         )
     keys = {place: point_key(stream, point) for place, point in points.items()}
-    results = sweep(
+    results = run_many(
         _Measurement(stream),
         {keys[place]: point for place, point in points.items()},
         done=done,
@@ -212,7 +212,7 @@ def _place(axis: xarray.DataArray, value: Any) -> int:
 
 
 class _Measurement:
-    """The work of a sweep."""
+    """The work of `run_many`."""
 
     def __init__(self, stream: SineStream) -> None:
         self.stream = stream

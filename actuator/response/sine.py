@@ -131,9 +131,8 @@ class SineStream:
         require_known(self.seen, [quantity.name for quantity in self.system.outputs], "output")
 
     def __getstate__(self) -> dict[str, Any]:
-        """Another process builds its own model, and finds the compiled one in the cache."""
-        state = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        return state | ({"plant": replace(self.plant)} if isinstance(self.plant, Actuator) else {})
+        """Without its engine, which another process builds for itself; the compiled model is in the cache."""
+        return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
     @cached_property
     def system(self) -> HybridSystem:

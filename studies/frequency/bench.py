@@ -3,7 +3,7 @@
 import base64
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from matplotlib.figure import Figure
@@ -61,14 +61,10 @@ class BenchPlan:
 
 
 class BenchWork:
-    """The work of a sweep: from the name of a test to what came of it."""
+    """The work of `run_many`: from the name of a test to what came of it."""
 
     def __init__(self, actuator: Actuator, plan: BenchPlan) -> None:
         self.actuator, self.plan = actuator, plan
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Another process builds its own model: expressions do not travel."""
-        return {"actuator": replace(self.actuator), "plan": self.plan}
 
     def __call__(self, name: str) -> dict[str, Any]:
         """Numbers with units by name, what is found in words, the picture as PNG in base64; and why there is none."""

@@ -20,8 +20,8 @@ from actuator import (
     torque_speed_curve,
     unpowered,
 )
+from actuator.simulation.many import run_many
 from actuator.simulation.signals import piece_at
-from actuator.simulation.sweep import sweep
 from studies.cache import Kept, actuator_of, fingerprint
 from studies.cases import Case
 from studies.frequency.bench import CORNERS, TESTS, BenchPlan, BenchWork
@@ -184,7 +184,7 @@ class _Work(NamedTuple):
         """Of the bench, by name; only one of them depends on the corners."""
         plans = {name: bench if name == CORNERS else replace(bench, sets={}) for name in TESTS}
         with _Steps(self.progress, len(TESTS)) as steps:
-            found = sweep(
+            found = run_many(
                 BenchWork(self.actuator, bench),
                 {f"{name}, {fingerprint([model, asdict(each)])}": name for name, each in plans.items()},
                 done=self.kept,
@@ -243,13 +243,13 @@ def _checks(plan: Plan, family: FrequencyResponse, place: Place) -> tuple[LimitC
 
 
 class _Steps:
-    """Turns the counts of a sweep into steps of a bar, and makes them complete where all was done before."""
+    """Turns the counts of `run_many` into steps of a bar, and makes them complete where all was done before."""
 
     def __init__(self, progress: Callable[[int], None], count: int) -> None:
         self.progress, self.left = progress, count
 
     def __call__(self, done: int, count: int) -> None:
-        """What `sweep` calls."""
+        """What `run_many` calls."""
         self.progress(self.left - (count - done))
         self.left = count - done
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 
 from actuator import SimulationError
-from actuator.simulation.processes import processes
+from actuator.simulation.many import processes
 from actuator.simulation.run import Run
 from actuator.verdict.verdict import FAILED, REST, Hunting, Verdict, decide
 from studies.cache import Stages, actuator_of

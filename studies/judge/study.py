@@ -31,12 +31,12 @@ from actuator.diagnosis.countermeasures import Remedy, RemedySearch, RemedyTable
 from actuator.orbits.find_sampled import find_sampled_orbit
 from actuator.orbits.flow import flow_map
 from actuator.orbits.sampled import SampledOrbit
-from actuator.simulation.processes import processes
+from actuator.simulation.many import processes
 from actuator.simulation.signals import piece_at
 from actuator.stiction.margins import ENDINGS, HuntingMargin, hunting_margin
 from actuator.system.builder import PREFIX
 from actuator.verdict.verdict import DIVERGING
-from studies.cache import CONVERTER, KeepingExecutor, Missing, Stages, actuator_of
+from studies.cache import CONVERTER, Missing, Stages, actuator_of
 from studies.cases import Case
 
 MODES = ("stuck", "forward", "backward")
@@ -178,8 +178,8 @@ class _Inside:
         with contextlib.ExitStack() as stack:
             search = None
             if self.hunting.cycles:
-                pool = KeepingExecutor(stack.enter_context(processes(1)), self.stages, "remedy", Remedy)
-                search = RemedySearch(self.case.actuator, self.run, **self._options(), executor=pool)
+                how = {"executor": stack.enter_context(processes(1)), "done": self.stages.of(Remedy)}
+                search = RemedySearch(self.case.actuator, self.run, **self._options(), **how)
             orbit = self.orbit() if self.hunting.cycles else None
             tell(ORBIT)
             margins = self.margins()

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from actuator.simulation.many import run_many
 from actuator.stiction.margins import sliding_of
 from studies.cache import fingerprint
 from studies.specification import Tolerance, matching
@@ -158,7 +159,7 @@ def robustness(  # noqa: PLR0913 - the study, and how it is run
     seed : int
         Of the random points.
     done, workers, progress
-        As for `sweep`.
+        As for `run_many`.
 
     Raises
     ------
@@ -167,8 +168,6 @@ def robustness(  # noqa: PLR0913 - the study, and how it is run
     ValueError
         Without tolerances, or with a base that is no power of two.
     """
-    from actuator.simulation.sweep import sweep
-
     if not tolerances:
         raise ValueError("robustness needs at least one tolerance: add [[tolerances]] to the specification")
     if base < 2 or base & (base - 1):  # noqa: PLR2004 - Sobol' points fill the space in powers of two
@@ -178,7 +177,7 @@ def robustness(  # noqa: PLR0913 - the study, and how it is run
     rows = factors(sample(base), tolerances)
     sets = [{**nominal, **spread(nominal, tolerances, row.tolist())} for row in rows]
     keys = [fingerprint([about, values]) for values in sets]
-    found = sweep(work, dict(zip(keys, sets, strict=True)), done=done, workers=workers, progress=progress)
+    found = run_many(work, dict(zip(keys, sets, strict=True)), done=done, workers=workers, progress=progress)
     results = [found[key] for key in keys]
     block = len(names) + 2
     independent = [result for k, result in enumerate(results) if k % block in (0, block - 1)]  # A and B of the scheme

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, MutableMapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,10 +10,10 @@ import numpy as np
 from actuator.actuator import Actuator
 from actuator.response.sine import SinePoint, SineStream
 from actuator.simulation.failures import SimulationError
+from actuator.simulation.many import run_many
 from actuator.simulation.run import Run
 from actuator.simulation.signals import Step
 from actuator.simulation.simulate import simulate
-from actuator.simulation.sweep import sweep
 from actuator.stiction.margins import SLIDING, at_least_sliding
 from actuator.stiction.standstill import rest_of
 from actuator.verdict.verdict import FAILED, REST, Hunting, classify, decide
@@ -81,7 +81,7 @@ def _label(factor: float) -> str:
 
 
 class Bench:
-    """Runs trials of one actuator; another process builds its own model.
+    """Runs trials of one actuator.
 
     Parameters
     ----------
@@ -91,12 +91,6 @@ class Bench:
 
     def __init__(self, plant: Actuator) -> None:
         self.plant, self.stream = plant, SineStream(plant=plant)
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {"plant": replace(self.plant)}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__init__(state["plant"])
 
     def __call__(self, trial: Trial) -> dict[str, Any]:
         """Verdict and numbers of a step, or gain of a sine."""
@@ -183,7 +177,7 @@ def check_corners(  # noqa: PLR0913 - what is checked, and how it is run
     demand : Demand
         Amplitude, bandwidth and stiction margin.
     done, workers, progress
-        As for `sweep`.
+        As for `run_many`.
     """
     defaults, model = defaults_of(plant.system().parameters), repr(plant)
     wanted = {corner.name: trials(corner, design, demand, defaults) for corner in corners}
@@ -193,7 +187,7 @@ def check_corners(  # noqa: PLR0913 - what is checked, and how it is run
         for name, trial in named.items()
     }
     points = {keys[corner, name]: trial for corner, named in wanted.items() for name, trial in named.items()}
-    results = sweep(Bench(plant), points, done=done, workers=workers, progress=progress)
+    results = run_many(Bench(plant), points, done=done, workers=workers, progress=progress)
     return [_summed(corner, {name: results[keys[corner, name]] for name in named}) for corner, named in wanted.items()]
 
 

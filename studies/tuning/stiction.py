@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, MutableMapping, Sequence
 from typing import Any, NamedTuple
 
 from actuator.actuator import Actuator
-from actuator.simulation.sweep import sweep
+from actuator.simulation.many import run_many
 from actuator.stiction.margins import sliding_of
 from actuator.verdict.verdict import REST
 from studies.cache import fingerprint
@@ -71,12 +71,6 @@ class Seeker:
         self.bench = Bench(plant)
         self.defaults = defaults_of(plant.system().parameters)
 
-    def __getstate__(self) -> dict[str, Any]:
-        return {"bench": self.bench}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__init__(state["bench"].plant)
-
     def hunts(self, search: Search, factor: float) -> bool:
         """Whether a step does not come to rest; the largest is tried first, as it tells most often."""
         steps = step_trials(search.corner, search.design, search.demand, self.defaults, factor)
@@ -136,7 +130,7 @@ def stiction_margins(  # noqa: PLR0913 - what is searched, and how it is run
         for name, search in searches.items()
     }
     points = {keys[name]: search for name, search in searches.items()}
-    results = sweep(Seeker(plant), points, done=done, workers=workers, progress=progress)
+    results = run_many(Seeker(plant), points, done=done, workers=workers, progress=progress)
     return [StictionMargin(name, **results[key]) for name, key in keys.items()]
 
 

@@ -158,7 +158,7 @@ def tune(  # noqa: PLR0913 - the task, and how it is run
     margins : sequence of float
         Stiction margins of the trade-off curve.
     done : mutable mapping of str to dict or None
-        Finished simulations, as for `sweep`.
+        Finished simulations, as for `run_many`.
     workers : int or None
         Processes.
     progress : callable or None

@@ -128,3 +128,8 @@ from actuator.verdict.log import classify_log as classify_log
 from actuator.verdict.verdict import Hunting as Hunting
 from actuator.verdict.verdict import classify as classify
 from actuator.verdict.verdict import decide as decide
+from gear.quantities import renamed as _renamed
+
+FORMER: dict[str, str] = {}  # until 0.3
+__getattr__ = _renamed(__name__, FORMER)
+__version__ = "0.2.0"

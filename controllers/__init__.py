@@ -28,3 +28,7 @@ from controllers.scheduling import ScheduledGain as ScheduledGain
 from controllers.shapes import dead_zone as dead_zone
 from controllers.shapes import direction as direction
 from controllers.shapes import limited as limited
+from gear.quantities import renamed as _renamed
+
+FORMER: dict[str, str] = {}  # until 0.3
+__getattr__ = _renamed(__name__, FORMER)

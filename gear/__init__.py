@@ -37,6 +37,7 @@ from gear.lubrication.viscosity import Vogel as Vogel
 from gear.lubrication.viscosity import Walther as Walther
 from gear.mesh import BearingForce as BearingForce
 from gear.mesh import Mesh as Mesh
+from gear.quantities import renamed as _renamed
 from gear.shafts import Bearing as Bearing
 from gear.shafts import Shaft as Shaft
 from gear.teeth.engagement import Engagement as Engagement
@@ -45,3 +46,6 @@ from gear.teeth.geometry import GivenPair as GivenPair
 from gear.teeth.internal import InternalPair as InternalPair
 from gear.teeth.screw import ScrewPair as ScrewPair
 from gear.transmission import Transmission as Transmission
+
+FORMER: dict[str, str] = {}  # until 0.3
+__getattr__ = _renamed(__name__, FORMER)

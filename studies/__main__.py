@@ -7,6 +7,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
+from actuator import __version__
 from studies.cases import built_in, load_case
 from studies.checks.commands import benchmark, cross_check, gear_paper
 from studies.commands import FOLDER, RESUMES
@@ -48,6 +49,7 @@ class CaseGroup(click.Group):
 
 
 @click.group(cls=CaseGroup, invoke_without_command=True, subcommand_metavar="[PATH.toml | COMMAND]", epilog=RESUMES)
+@click.version_option(__version__, prog_name="geared-actuator")
 @click.option("--case", default=DEFAULT_CASE, show_default=True, help="Built-in case to run.")
 @click.option("--out", type=FOLDER, default=Path("out"), show_default=True,
               help="Folder for the results; those of a COMMAND stand in a folder of its name in it.")  # fmt: skip

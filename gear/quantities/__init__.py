@@ -9,6 +9,7 @@ from gear.quantities.checks import is_number as is_number
 from gear.quantities.checks import require_known as require_known
 from gear.quantities.checks import show as show
 from gear.quantities.checks import unit_of as unit_of
+from gear.quantities.former import renamed as renamed
 from gear.quantities.units import Angle as Angle
 from gear.quantities.units import Arm as Arm
 from gear.quantities.units import AtLeastOne as AtLeastOne

@@ -164,3 +164,39 @@ def test_a_name_or_default_that_is_taken_is_refused():
         part(Spring)(type("Coil", (Spring,), {"force": lambda self, stretch: 0.0, "__module__": "elsewhere"}))
     with pytest.raises(PartError, match="Spring: the default is Coil already, not Thing"):
         part(Spring, default=True)(derived(force=lambda self, stretch: 0.0))
+
+
+class Damper(Spring, Protocol):
+    """A slot that refines another one, with an attribute that its parts declare."""
+
+    sealed: bool
+
+    @abstractmethod
+    def loss(self, rate: float) -> float:
+        """[W]."""
+
+
+def test_a_part_is_one_of_the_slots_that_its_slot_refines():
+    @part(Damper)
+    @dataclass(frozen=True, kw_only=True)
+    class Strut(Damper):
+        """Springs and damps."""
+
+        sealed: bool
+
+        def force(self, stretch):
+            return stretch
+
+        def loss(self, rate):
+            return rate**2
+
+    assert parts(Damper) == {"Strut": Strut}
+    assert parts(Spring)["Strut"] is Strut
+    assert (default_part(Damper), default_part(Spring)) == ("Strut", "Coil")
+
+
+def test_what_the_refined_slot_asks_is_asked_and_attributes_are_declared():
+    with pytest.raises(PartError, match=r"Thing is no Spring: it lacks force\(self, stretch"):
+        part(Damper)(type("Thing", (Damper,), {"loss": lambda self, rate: 0.0, "sealed": True}))
+    with pytest.raises(PartError, match="Thing is no Damper: it does not declare sealed"):
+        part(Damper)(type("Thing", (Damper,), {"force": lambda self, stretch: 0.0, "loss": lambda self, rate: 0.0}))

@@ -5,6 +5,7 @@
     class Coulomb(FrictionLaw): ...
 
 A slot is a protocol: what the actuator asks of a part in that place, with defaults for what most parts need not say.
+A slot may refine another one; its parts are parts of both.
 A part is held against the protocols of its slots when it registers, and is known by its class name, in files too. It is
 found in any file of the folder that its slot is in. Parts of other packages are found by the entry points of the group
 `geared_actuator.parts`, each naming a module that registers its parts when it is imported.
@@ -16,7 +17,7 @@ import pkgutil
 from collections.abc import Callable
 from functools import cache
 from importlib.metadata import entry_points
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 GROUP = "geared_actuator.parts"
 
@@ -39,7 +40,7 @@ def part(*slots: type, default: bool = False) -> Callable[[Part], Part]:
     """
 
     def register(made: Part) -> Part:
-        for slot in slots:
+        for slot in dict.fromkeys(base for slot in slots for base in _refined(slot)):
             require_contract(made, slot)
             kinds = _parts.setdefault(slot, {})
             taken = kinds.get(made.__name__)
@@ -48,14 +49,20 @@ def part(*slots: type, default: bool = False) -> Callable[[Part], Part]:
                     f"{slot.__name__} {made.__name__} of {made.__module__}: there is one of that name in "
                     f"{taken.__module__}; rename one of them"
                 )
-            if default and _defaults.get(slot, made.__name__) != made.__name__:
+            is_default = default and slot in slots
+            if is_default and _defaults.get(slot, made.__name__) != made.__name__:
                 raise PartError(f"{slot.__name__}: the default is {_defaults[slot]} already, not {made.__name__}")
             kinds[made.__name__] = made
-            if default:
+            if is_default:
                 _defaults[slot] = made.__name__
         return made
 
     return register
+
+
+def _refined(slot: type) -> list[type]:
+    """A slot and the slots that it refines."""
+    return [kind for kind in slot.__mro__ if Protocol in kind.__bases__]
 
 
 def is_slot(kind: Any) -> bool:
@@ -116,8 +123,8 @@ def require_contract(made: type, slot: type) -> None:
             raise PartError(f"{made.__name__} is no {slot.__name__}: it lacks {name}{what}")
         if inspect.isfunction(asked):
             _require_signature(made, slot, name, asked)
-    for name in getattr(slot, "__annotations__", {}):
-        if not (hasattr(made, name) or name in getattr(made, "__annotations__", {})):
+    for name in vars(slot).get("__annotations__", {}):
+        if not (hasattr(made, name) or name in getattr(made, "__dataclass_fields__", {})):
             raise PartError(f"{made.__name__} is no {slot.__name__}: it does not declare {name}")
 
 

@@ -1,17 +1,10 @@
 """What a control law remembers, and the contract of laws that remember something."""
 
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
-from gear.quantities import Scalar
+from gear.quantities import Memory, Scalar
 
-
-class Memory(NamedTuple):
-    """One number that a law keeps from one instant to the next."""
-
-    name: str
-    unit: str
-    nominal: float  # usual size, for the error control
-    initial: float = 0.0
+__all__ = ["LawWithMemory", "Memory"]
 
 
 class LawWithMemory(Protocol):

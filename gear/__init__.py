@@ -5,7 +5,7 @@ from gear.couplings import EndStop as EndStop
 from gear.elasticity.backlash import Backlash as Backlash
 from gear.elasticity.backlash import BacklashAsPrinted as BacklashAsPrinted
 from gear.elasticity.curves import elasticity_curves as elasticity_curves
-from gear.elasticity.laws import ElasticityLaws as ElasticityLaws
+from gear.elasticity.law import ElasticityLaw as ElasticityLaw
 from gear.elasticity.linear import Linear as Linear
 from gear.elasticity.periodic import PeriodicStiffness as PeriodicStiffness
 from gear.elasticity.progressive import ProgressiveISO as ProgressiveISO
@@ -17,7 +17,7 @@ from gear.elasticity.transmission_error import TransmissionError as Transmission
 from gear.friction.at_viscosity import AtViscosity as AtViscosity
 from gear.friction.coulomb import Coulomb as Coulomb
 from gear.friction.din3990 import Din3990 as Din3990
-from gear.friction.law import FrictionLaws as FrictionLaws
+from gear.friction.law import FrictionLaw as FrictionLaw
 from gear.friction.over_speed import FrictionPoint as FrictionPoint
 from gear.friction.over_speed import FrictionTable as FrictionTable
 from gear.friction.over_speed import Stribeck as Stribeck

@@ -7,7 +7,9 @@ from typing import Literal
 import numpy as np
 
 from gear.balance import NoSteadyState, balance
+from gear.friction.law import FrictionLaw
 from gear.motion import Sliding
+from gear.teeth.pair import Pair
 from gear.transmission import Transmission
 
 NO_LOAD = 1e-9  # part of a load that is none
@@ -48,7 +50,7 @@ def breakout(gear: Transmission, *, torque: float, direction: Literal[1, -1] = 1
 
     bare = replace(gear, bearings={})
 
-    margin = _last_positive(lambda factor: _held_at_input(scaled(bare, factor), direction, 1.0))
+    margin = _last_positive(lambda factor: _held_at_input(scale_friction(bare, factor), direction, 1.0))
     reach = float("inf")
     if margin > 1:
         # linear in the load but for laws that depend on it: bearings offset it, meshes scale it
@@ -92,22 +94,31 @@ def _safe(gives: Callable[[float], float], scale: float) -> float:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Scaled:
+class _Scaled(FrictionLaw):
     """A friction law with all its coefficients multiplied by a factor."""
 
-    law: object
+    law: FrictionLaw
     factor: float
+
+    @property
+    def sticks(self) -> bool:
+        """Whether the law does."""
+        return self.law.sticks
+
+    def require_pair(self, pair: Pair) -> None:
+        """Raise ValueError where the law has no meaning for the teeth of a pair."""
+        self.law.require_pair(pair)
 
     def coefficient(self, sliding: Sliding) -> float:
         """Sliding coefficient [-]."""
-        return self.factor * self.law.coefficient(sliding)  # type: ignore[attr-defined]
+        return self.factor * self.law.coefficient(sliding)
 
     def breakaway(self, sliding: Sliding) -> float:
         """Coefficient at breakaway [-]."""
-        return self.factor * self.law.breakaway(sliding)  # type: ignore[attr-defined]
+        return self.factor * self.law.breakaway(sliding)
 
 
-def scaled(gear: Transmission, factor: float) -> Transmission:
+def scale_friction(gear: Transmission, factor: float) -> Transmission:
     """The same transmission with all mesh friction multiplied by a factor."""
     meshes = {
         name: mesh if mesh.friction is None else replace(mesh, friction=_Scaled(law=mesh.friction, factor=factor))

@@ -4,8 +4,6 @@ from typing import TYPE_CHECKING
 
 from gear.balance import balance
 from gear.mesh import Mesh
-from gear.teeth.geometry import GivenPair
-from gear.teeth.screw import ScrewPair
 from gear.transmission import Transmission
 
 if TYPE_CHECKING:
@@ -50,14 +48,7 @@ def table(gear: Transmission, *, output_torque: float = -1.0, output_speed: floa
 
 def teeth(mesh: Mesh) -> str:
     """Numbers of teeth of a mesh, or its radii where it has none; with the number of equal ones."""
-    pair = mesh.pair
-    if isinstance(pair, ScrewPair):
-        text = f"screw of lead {1e3 * pair.lead:.4g} mm"
-    elif not isinstance(pair, GivenPair):
-        text = f"{pair.teeth_a} : {pair.teeth_b}"
-    else:
-        text = f"{1e3 * pair.radius_a:.4g} : {1e3 * pair.radius_b:.4g} mm"
-    return text if mesh.count == 1 else f"{mesh.count} x {text}"
+    return mesh.pair.size() if mesh.count == 1 else f"{mesh.count} x {mesh.pair.size()}"
 
 
 def _role(gear: Transmission, name: str) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 
 from gear.quantities import Number, Scalar, check
-from gear.teeth.geometry import Pair
+from gear.teeth.pair import Pair
 
 SAMPLES = 1000  # of a period, per harmonic; between them the factor is off by less than 5e-6 of its amplitudes
 

@@ -6,13 +6,11 @@ from typing import Literal, NamedTuple
 
 import casadi as ca
 
-from gear.elasticity.laws import ElasticityLaw, ElasticityLaws, as_law
-from gear.friction.law import FrictionLaws, require_suited
+from gear.elasticity.law import ElasticityLaw
+from gear.friction.law import FrictionLaw
 from gear.motion import MeshMotion
 from gear.quantities import Scalar, check_count, show
-from gear.teeth.geometry import ExternalPair, GivenPair
-from gear.teeth.internal import InternalPair
-from gear.teeth.screw import ScrewPair
+from gear.teeth.pair import Pair
 
 MESH_SPEED_NOMINAL = 1e-2  # m/s
 
@@ -50,11 +48,11 @@ class Mesh:
         Names of the shafts of wheel A and wheel B.
     carrier : str or None
         Name of the shaft that carries the line of centers; None for the housing.
-    pair : ExternalPair, InternalPair, GivenPair or ScrewPair
+    pair : Pair
         Radii and averaged friction arms.
-    elasticity : Linear, Backlash, TransmissionError, ... or None
+    elasticity : ElasticityLaw or None
         Normal force from deflection and its rate; None for rigid teeth, a constraint.
-    friction : Coulomb, ... or None
+    friction : FrictionLaw or None
         Friction coefficients; None for no losses. Rigid teeth have none: their normal force is not a law.
     count : int
         Equal meshes side by side that share the load (the planets of a set, lumped into one shaft).
@@ -71,9 +69,9 @@ class Mesh:
     a: str
     b: str
     carrier: str | None = None
-    pair: ExternalPair | InternalPair | GivenPair | ScrewPair
-    elasticity: ElasticityLaws | None = None
-    friction: FrictionLaws | None = None
+    pair: Pair
+    elasticity: ElasticityLaw | None = None
+    friction: FrictionLaw | None = None
     count: int = 1
     stick_by: Literal["mesh speed", "conjugate speed"] = "mesh speed"
 
@@ -92,14 +90,16 @@ class Mesh:
                 f"{show(self.pair.friction_arm_a, 'm')} and {show(self.pair.friction_arm_b, 'm')} its pair does not "
                 "slide as it rolls; give it other arms, or leave the friction out"
             )
-        require_suited(self.friction, self.pair)
-        require_suited(self.elasticity, self.pair)
+        for law in (self.friction, self.elasticity):
+            if law is not None:
+                law.require_pair(self.pair)
         check_count(self, "count")
         if self.stick_by not in ("mesh speed", "conjugate speed"):
             raise ValueError(f'Mesh.stick_by must be "mesh speed" or "conjugate speed", got {self.stick_by!r}')
-        if isinstance(self.pair, ScrewPair) and self.stick_by == "mesh speed":
+        if not self.pair.sticks_by_mesh_speed and self.stick_by == "mesh speed":
             raise ValueError(
-                'Mesh.stick_by must be "conjugate speed" for a ScrewPair, got "mesh speed"; it rubs along its slope'
+                f'Mesh.stick_by must be "conjugate speed" for a {type(self.pair).__name__}, got "mesh speed"; it rubs '
+                "along its slope"
             )
 
     @property
@@ -108,10 +108,10 @@ class Mesh:
         return self.elasticity is None
 
     def law(self) -> ElasticityLaw:
-        """The elasticity as a law of the whole mesh; a bare tooth spring acts on both flanks."""
+        """The elasticity; rigid teeth have none."""
         if self.elasticity is None:
             raise ValueError("rigid teeth have no law of elasticity: their normal force is that of a constraint")
-        return as_law(self.elasticity)
+        return self.elasticity
 
     def motion(self, angle: Mapping[str, Scalar], speed: Mapping[str, Scalar]) -> MeshMotion:
         """Position and motion of the mesh from the angles [rad] and speeds [rad/s] of the shafts."""

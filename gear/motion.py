@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from gear.quantities import Scalar
-from gear.teeth.geometry import Pair
+from gear.teeth.pair import Pair
 
 
 class MeshMotion(NamedTuple):

@@ -10,11 +10,12 @@ from typing import Annotated, Literal
 
 from annotated_types import Ge, Unit
 
-from gear.elasticity.laws import ElasticityLaws
-from gear.friction.law import FrictionLaws
+from gear.elasticity.law import ElasticityLaw
+from gear.friction.law import FrictionLaw
 from gear.mesh import Mesh
 from gear.quantities import Inertia, check, check_count
 from gear.shafts import Shaft
+from gear.teeth.pair import Pair
 from gear.transmission import Transmission
 
 
@@ -30,17 +31,17 @@ class MeshLaws:
         As for `Mesh`, but the conjugate speed by default: a light planet in a ring cannot stick by mesh speed.
     """
 
-    elasticity: ElasticityLaws | None = None
-    friction: FrictionLaws | None = None
+    elasticity: ElasticityLaw | None = None
+    friction: FrictionLaw | None = None
     stick_by: Literal["mesh speed", "conjugate speed"] = "conjugate speed"
 
-    def mesh(self, a: str, b: str, pair: object, *, carrier: str | None = None, count: int = 1) -> Mesh:
+    def mesh(self, a: str, b: str, pair: Pair, *, carrier: str | None = None, count: int = 1) -> Mesh:
         """A mesh with these laws."""
         return Mesh(
             a=a,
             b=b,
             carrier=carrier,
-            pair=pair,  # pyright: ignore[reportArgumentType]
+            pair=pair,
             elasticity=self.elasticity,
             friction=self.friction,
             stick_by=self.stick_by,

@@ -12,7 +12,7 @@ from actuator import Actuator, Load, TorqueSource, simulate
 from gear import Backlash, Bearing, Coulomb, ExternalPair, Linear, Mesh, Shaft, Transmission
 from gear.arrangements import spur_pair, train
 from gear.balance import balance
-from gear.breakout import breakout, scaled
+from gear.breakout import breakout, scale_friction
 from gear.efficiency import efficiency, efficiency_map, mesh_efficiencies, plot_efficiency
 from gear.planets import MeshLaws
 from gear.shafts import Drag
@@ -84,13 +84,13 @@ def test_a_gear_locks_itself_where_its_friction_is_that_many_times_larger():
     # driven by B, wheel A gives nothing where mu e_A = r_A cos(alpha)
     expected = math.cos(PAIR.working_angle) * PAIR.radius_a / PAIR.friction_arm_a / 0.15
     assert margin == pytest.approx(expected, rel=1e-9)
-    locked = breakout(scaled(GEAR, 1.01 * margin), torque=1.0)
+    locked = breakout(scale_friction(GEAR, 1.01 * margin), torque=1.0)
     assert locked.self_locking
     assert locked.output_torque == math.inf
 
 
 def test_efficiency_over_load_speed_and_temperature_is_a_labelled_dataset():
-    gears = {218.15: scaled(GEAR, 2.0), 293.15: GEAR}
+    gears = {218.15: scale_friction(GEAR, 2.0), 293.15: GEAR}
     data = efficiency_map(gears, torques=[1.0, 2.0, 4.0], speeds=[0.5, 1.0])
     assert dict(data.sizes) == {"temperature": 2, "torque": 3, "speed": 2}
     assert data.torque.attrs["units"] == "N m"

@@ -35,7 +35,7 @@ from gear import (
     TransmissionError,
     elasticity_curves,
 )
-from gear.elasticity.laws import as_law, has_gap
+from gear.elasticity.law import has_gap
 from gear.motion import MeshMotion
 from studies.converter import converter
 
@@ -70,7 +70,7 @@ def with_error(law):
 
 
 LAWS = (
-    *(as_law(spring) for spring in SPRINGS),
+    *(SPRINGS),
     *GAPPED,
     *(periodic(law) for law in (ISO, *GAPPED)),
     *(faulty(law) for law in (ISO, *GAPPED)),

@@ -18,7 +18,7 @@ from gear import (
     Coulomb,
     Din3990,
     EfficiencyPoint,
-    FrictionLaws,
+    FrictionLaw,
     FrictionPoint,
     FrictionTable,
     GivenPair,
@@ -418,7 +418,7 @@ WRONG_ARMS = GivenPair(radius_a=0.01, radius_b=0.03, friction_arm_a=1e-3, fricti
         (lambda: replace(STRIBECK, stribeck_speed=0.0), "Stribeck.stribeck_speed must be > 0 m/s, got 0 m/s"),
         (
             lambda: friction_table((0, 0.3), static=0.2),
-            r"FrictionTable needs points\[0\].coefficient <= static, got 0.3 and static=0.2",
+            r"FrictionTable needs points\[0\].coefficient <= static, got points\[0\].coefficient=0.3 and static=0.2",
         ),
         (lambda: friction_table((0, 0.1), (0, 0.1), static=0.2), r"FrictionTable.points\[1\].speed must be > 0 m/s"),
         (lambda: friction_table((0, -0.1), static=0.2), "FrictionPoint.coefficient must be >= 0, got -0.1"),
@@ -475,7 +475,7 @@ def test_laws_without_meaning_are_refused(make, message):
     ids=lambda value: value.get("type") if isinstance(value, dict) else "",
 )
 def test_law_can_be_read_from_a_file(table, law):
-    assert converter().structure(table, FrictionLaws) == law
+    assert converter().structure(table, FrictionLaw) == law
 
 
 # -- whole runs ---------------------------------------------------------------------------------------

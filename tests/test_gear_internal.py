@@ -228,6 +228,7 @@ def test_turning_the_pair_round_is_the_same_physics(pair, speed, load, part, fla
         friction_arm_a=pair.friction_arm_b,
         friction_arm_b=pair.friction_arm_a,
         friction_factor=-pair.friction_factor,
+        sticks_by_mesh_speed=True,
     )
     turned = dataclasses.replace(mesh, a="b", b="a", pair=swapped)
     assert along(turned.deflection_per_shaft(), speed) == pytest.approx(along(mesh.deflection_per_shaft(), speed))

@@ -6,13 +6,13 @@ from hypothesis import strategies as st
 from oracles import gradient_in_symbols, in_symbols, numbers, pressed, rubbing, signs
 
 from gear import Backlash, Coulomb, Linear
-from gear.elasticity.laws import Gapless, has_gap
+from gear.elasticity.law import has_gap
 
 TEETH = Linear(stiffness=2e8, damping=2e5)  # van der Linden, section 4.1
 GAP = 15e-6  # m, total: van der Linden, Table 3
 WITH_GAP = Backlash(gap=GAP, law=TEETH)
 ELASTIC_LAWS = (
-    Gapless(law=TEETH),
+    TEETH,
     WITH_GAP,
     Backlash(gap=0.0, law=TEETH),
     Backlash(gap=GAP, law=Linear(stiffness=1e6, damping=0.0)),
@@ -156,7 +156,7 @@ def test_penetration_is_counted_from_the_flank_and_positive_in_contact(law, pene
 @given(deflection=deflections, rate=rates, flank=flanks)
 def test_linear_teeth_are_a_spring_and_a_damper(deflection, rate, flank):
     """Van der Linden, eq. (40)."""
-    law = Gapless(law=TEETH)
+    law = TEETH
     assert force(law, deflection, rate, flank) == pytest.approx(2e8 * deflection + 2e5 * rate)
     assert energy(law, deflection, flank) == pytest.approx(1e8 * deflection**2)
 

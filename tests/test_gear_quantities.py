@@ -38,7 +38,7 @@ PARTS_OF_AN_ACTUATOR = (
 
 def components():
     """Every public dataclass whose docstring lists parameters (results list attributes)."""
-    packages = [f"{package.__name__}.{info.name}" for package in (gear, controllers) for info in modules_of(package)]
+    packages = [info.name for package in (gear, controllers) for info in modules_of(package)]
     modules = [importlib.import_module(name) for name in (*packages, *PARTS_OF_AN_ACTUATOR)]
     return [
         thing
@@ -52,7 +52,7 @@ def components():
 
 
 def modules_of(package):
-    return pkgutil.iter_modules(package.__path__)
+    return pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
 
 
 def numbers_without_unit(component):

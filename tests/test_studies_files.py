@@ -399,7 +399,7 @@ WRONG = [
     (
         'friction = { type = "Coulomb", sliding',
         'friction = { type = "Dahl", sliding',
-        f'{FIRST}.friction.type = "Dahl" must be one of Coulomb, Din3990',
+        f'{FIRST}.friction.type = "Dahl" must be one of AtViscosity, Coulomb, Din3990',
     ),
     (
         'type = "Step"',

@@ -8,7 +8,7 @@ import casadi as ca
 from actuator.system.hybrid import MARGIN_BAND, Event, EventKind, Mode, ModeKind, Place
 from actuator.system.hybrid import Contact as ContactRecord
 from gear.couplings import TWIST_NOMINAL, EndStop, Twist
-from gear.elasticity.laws import DEFLECTION_NOMINAL, has_gap
+from gear.elasticity.law import DEFLECTION_NOMINAL, has_gap
 from gear.kinematics import Kinematics
 from gear.motion import MeshMotion
 from gear.quantities import Scalar

@@ -1,6 +1,7 @@
 """What the temperatures of a thermal network are to the other parts of an actuator, and what they heat."""
 
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any
 
 import casadi as ca
@@ -9,7 +10,7 @@ from actuator.parts.temperature import MotorTemperature
 from actuator.parts.thermal import ThermalNetwork
 from actuator.system.builder import SystemBuilder
 from actuator.system.parameters import substituted, unchecked
-from gear.lubrication.lubricant import MEASURED, OilAt
+from gear.lubrication.lubricant import MEASURED, oil_temperatures
 from gear.quantities import Scalar
 from gear.quantities.roles import NodeTemperature
 
@@ -69,7 +70,9 @@ class HeatFlow:
             return gear
 
         def warmed(part: Any) -> Any:
-            return unchecked(OilAt, oil=part.oil, temperature=oil) if isinstance(part, OilAt) else None
+            own = oil_temperatures(part)
+            values = {field.name: oil if field.name in own else getattr(part, field.name) for field in fields(part)}
+            return unchecked(type(part), **values) if own else None
 
         return substituted(gear, warmed, keep=(MEASURED,))
 

@@ -5,18 +5,16 @@ from typing import Annotated
 
 import casadi as ca
 
-from gear.elasticity.law import DEFLECTION_NOMINAL, pushing
-from gear.elasticity.linear import Linear
-from gear.elasticity.progressive import ProgressiveISO, ProgressiveNiemann
+from gear.elasticity.law import DEFLECTION_NOMINAL, ElasticityLaw, ToothSpring, pushing
 from gear.motion import MeshMotion
 from gear.quantities import Distance, Scalar, check
+from gear.quantities.registry import part
 from gear.quantities.roles import Gap
 
-Teeth = Linear | ProgressiveISO | ProgressiveNiemann  # every tooth spring, as fields of files know them
 
-
+@part(ElasticityLaw)
 @dataclass(frozen=True, kw_only=True)
-class Backlash:
+class Backlash(ElasticityLaw):
     """A gap between the flanks around any tooth spring; the teeth can push and cannot pull.
 
         x   = flank * deflection - gap/2                        penetration of the engaged flank
@@ -33,7 +31,7 @@ class Backlash:
     ----------
     gap : float
         TOTAL gap between the flanks, on the pitch circle [m].
-    law : Linear, ProgressiveISO or ProgressiveNiemann
+    law : ToothSpring
         Elasticity of the engaged teeth.
 
     References
@@ -43,7 +41,7 @@ class Backlash:
     """
 
     gap: Annotated[Distance, Gap()]
-    law: Teeth
+    law: ToothSpring
 
     def __post_init__(self) -> None:
         check(self)
@@ -70,8 +68,9 @@ class Backlash:
         return self.law.spring(DEFLECTION_NOMINAL)
 
 
+@part(ElasticityLaw)
 @dataclass(frozen=True, kw_only=True)
-class BacklashAsPrinted:
+class BacklashAsPrinted(ElasticityLaw):
     """Backlash as the gear paper prints it: the whole damping force acts as long as the flanks overlap.
 
         x   = flank * deflection - gap/2                        penetration of the engaged flank
@@ -84,7 +83,7 @@ class BacklashAsPrinted:
     ----------
     gap : float
         TOTAL gap between the flanks, on the pitch circle [m].
-    law : Linear, ProgressiveISO or ProgressiveNiemann
+    law : ToothSpring
         Elasticity of the engaged teeth.
 
     References
@@ -93,7 +92,7 @@ class BacklashAsPrinted:
     """
 
     gap: Annotated[Distance, Gap()]
-    law: Teeth
+    law: ToothSpring
 
     def __post_init__(self) -> None:
         check(self)

@@ -6,20 +6,18 @@ from typing import TYPE_CHECKING
 import casadi as ca
 import numpy as np
 
-from gear.elasticity.law import AT_REST, ElasticityLaw, ToothSpring, as_law, has_gap
+from gear.elasticity.law import AT_REST, ElasticityLaw, has_gap
 
 if TYPE_CHECKING:
     import xarray
 
 
-def elasticity_curves(
-    laws: Mapping[str, ToothSpring | ElasticityLaw], deflections: Sequence[float] | np.ndarray
-) -> "xarray.Dataset":
+def elasticity_curves(laws: Mapping[str, ElasticityLaw], deflections: Sequence[float] | np.ndarray) -> "xarray.Dataset":
     """Normal force and stiffness of several laws over the deflection of a mesh at rest.
 
     Parameters
     ----------
-    laws : mapping of str to tooth spring or elasticity law
+    laws : mapping of str to ElasticityLaw
         By the name under which the curve is found.
     deflections : sequence of float, (n,)
         [m], ascending or not.
@@ -34,7 +32,7 @@ def elasticity_curves(
     import xarray
 
     grid = np.asarray(deflections, dtype=float)
-    rows = np.array([_force_and_stiffness(as_law(law), grid) for law in laws.values()]).reshape(-1, 2, grid.size)
+    rows = np.array([_force_and_stiffness(law, grid) for law in laws.values()]).reshape(-1, 2, grid.size)
     return xarray.Dataset(
         {
             "force": (("law", "deflection"), rows[:, 0], {"units": "N"}),

@@ -2,11 +2,14 @@
 
 from dataclasses import dataclass
 
+from gear.elasticity.law import ToothSpring
 from gear.quantities import Damping, Scalar, Stiffness, check
+from gear.quantities.registry import part
 
 
+@part(ToothSpring)
 @dataclass(frozen=True, kw_only=True)
-class Linear:
+class Linear(ToothSpring):
     """Linear spring and damper.
 
         F_n = stiffness * deflection + damping * rate

@@ -2,18 +2,19 @@
 
 from dataclasses import dataclass
 
-from gear.elasticity.backlash import Backlash, BacklashAsPrinted, Teeth
-from gear.elasticity.law import as_law
+from gear.elasticity.law import ElasticityLaw
 from gear.harmonics import Harmonic, lowest_factor, pitch_of, tooth_factor
 from gear.motion import MeshMotion
 from gear.quantities import Length, Scalar, check
-from gear.teeth.geometry import Pair
+from gear.quantities.registry import part
+from gear.teeth.pair import Pair
 
 SOFTEST = 0.01  # factor; teeth in contact are never that soft, and zero would leave them without a force
 
 
+@part(ElasticityLaw)
 @dataclass(frozen=True, kw_only=True)
-class PeriodicStiffness:
+class PeriodicStiffness(ElasticityLaw):
     """Any law of elasticity times a factor that repeats with every tooth, as more and fewer pairs share the load.
 
         F_n = law * factor(x),     factor = 1 + sum_k (cosine_k cos(2 pi k x/pitch) + sine_k sin(2 pi k x/pitch))
@@ -29,7 +30,7 @@ class PeriodicStiffness:
 
     Parameters
     ----------
-    law : Linear, ProgressiveISO, ProgressiveNiemann, Backlash or BacklashAsPrinted
+    law : ElasticityLaw
         The mean over a tooth.
     harmonics : tuple of Harmonic
         First, second, ... over one tooth. Its numbers stay constants of a model; they are not parameters.
@@ -49,7 +50,7 @@ class PeriodicStiffness:
     doi 10.1115/1.1891815, for the torque that is left out.
     """
 
-    law: Teeth | Backlash | BacklashAsPrinted
+    law: ElasticityLaw
     harmonics: tuple[Harmonic, ...]
     pitch: Length | None = None
 
@@ -65,6 +66,7 @@ class PeriodicStiffness:
     def require_pair(self, pair: Pair) -> None:
         """Raise ValueError where neither the law nor a pair says the pitch."""
         pitch_of(self, pair)
+        self.law.require_pair(pair)
 
     def factor(self, position: Scalar, pair: Pair | None = None) -> Scalar:
         """Factor [-] at a feed [m]."""
@@ -72,16 +74,16 @@ class PeriodicStiffness:
 
     def force(self, motion: MeshMotion, flank: Scalar) -> Scalar:
         """Normal force [N], positive when A pushes B towards positive travel."""
-        return self.factor(motion.position, motion.pair) * as_law(self.law).force(motion, flank)
+        return self.factor(motion.position, motion.pair) * self.law.force(motion, flank)
 
     def stored(self, motion: MeshMotion, flank: Scalar) -> Scalar:
         """Integral of the elastic force over the deflection, at the present position [J]."""
-        return self.factor(motion.position, motion.pair) * as_law(self.law).stored(motion, flank)
+        return self.factor(motion.position, motion.pair) * self.law.stored(motion, flank)
 
     def penetration(self, motion: MeshMotion, flank: Scalar) -> Scalar:
         """How far the teeth are pressed into each other on a flank [m]; None without a gap."""
-        return as_law(self.law).penetration(motion, flank)
+        return self.law.penetration(motion, flank)
 
     def nominal_force(self) -> Scalar:
         """Size of a usual normal force [N], that of the law."""
-        return as_law(self.law).nominal_force()
+        return self.law.nominal_force()

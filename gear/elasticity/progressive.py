@@ -4,11 +4,14 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from gear.elasticity.law import ToothSpring
 from gear.quantities import Damping, Force, Length, Part, Scalar, Stiffness, check
+from gear.quantities.registry import part
 
 
+@part(ToothSpring)
 @dataclass(frozen=True, kw_only=True)
-class ProgressiveISO:
+class ProgressiveISO(ToothSpring):
     """Stiffness that grows with the deflection up to the roughness; the law the gear paper names after ISO 6336-1.
 
         F_n = stiffness / (2 roughness) * deflection^2 * sign(deflection)              |deflection| <= roughness
@@ -61,8 +64,9 @@ class ProgressiveISO:
         return self.stiffness * (rough**3 / (6 * self.roughness) + (rough + beyond) * beyond / 2)
 
 
+@part(ToothSpring)
 @dataclass(frozen=True, kw_only=True)
-class ProgressiveNiemann:
+class ProgressiveNiemann(ToothSpring):
     """Stiffness that grows with the force up to a nominal one; for what the gear paper names after Niemann and Winter.
 
         dF_n/d(deflection) = stiffness * (initial + (1 - initial) |F_n| / nominal_force)     |F_n| <= nominal_force

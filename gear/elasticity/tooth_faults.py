@@ -7,11 +7,11 @@ from typing import Literal
 
 import casadi as ca
 
-from gear.elasticity.backlash import Backlash, BacklashAsPrinted, Teeth
-from gear.elasticity.law import as_law
-from gear.elasticity.periodic import PeriodicStiffness
+from gear.elasticity.law import ElasticityLaw
 from gear.motion import MeshMotion
 from gear.quantities import Angle, Scalar, Share, check, check_count
+from gear.quantities.registry import part
+from gear.teeth.pair import Pair
 
 LOG_3 = math.log(3.0)  # (1 + tanh)/2 is 10 % and 90 % at -+ log(3)
 
@@ -73,8 +73,9 @@ class ToothFault:
         return 1 - (1 - self.remaining) * self.window(turn)
 
 
+@part(ElasticityLaw)
 @dataclass(frozen=True, kw_only=True)
-class ToothFaults:
+class ToothFaults(ElasticityLaw):
     """Any law of elasticity with weak or missing teeth: a forcing once per turn of a wheel, for health monitoring.
 
         F_n = law * product of the factors of the faults
@@ -84,13 +85,13 @@ class ToothFaults:
 
     Parameters
     ----------
-    law : Linear, ProgressiveISO, ProgressiveNiemann, Backlash, BacklashAsPrinted or PeriodicStiffness
+    law : ElasticityLaw
         Sound teeth.
     faults : mapping of str to ToothFault
         By name.
     """
 
-    law: Teeth | Backlash | BacklashAsPrinted | PeriodicStiffness
+    law: ElasticityLaw
     faults: Mapping[str, ToothFault]
 
     def factor(self, motion: MeshMotion) -> Scalar:
@@ -100,18 +101,22 @@ class ToothFaults:
             product = product * fault.factor(motion)
         return product
 
+    def require_pair(self, pair: Pair) -> None:
+        """Raise ValueError where the law has no meaning for the teeth of a pair."""
+        self.law.require_pair(pair)
+
     def force(self, motion: MeshMotion, flank: Scalar) -> Scalar:
         """Normal force [N], positive when A pushes B towards positive travel."""
-        return self.factor(motion) * as_law(self.law).force(motion, flank)
+        return self.factor(motion) * self.law.force(motion, flank)
 
     def stored(self, motion: MeshMotion, flank: Scalar) -> Scalar:
         """Integral of the elastic force over the deflection, at the present turn of the wheels [J]."""
-        return self.factor(motion) * as_law(self.law).stored(motion, flank)
+        return self.factor(motion) * self.law.stored(motion, flank)
 
     def penetration(self, motion: MeshMotion, flank: Scalar) -> Scalar:
         """How far the teeth are pressed into each other on a flank [m]; None without a gap."""
-        return as_law(self.law).penetration(motion, flank)
+        return self.law.penetration(motion, flank)
 
     def nominal_force(self) -> Scalar:
         """Size of a usual normal force [N], that of the law."""
-        return as_law(self.law).nominal_force()
+        return self.law.nominal_force()

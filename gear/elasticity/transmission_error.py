@@ -6,12 +6,11 @@ from typing import Literal
 
 import casadi as ca
 
-from gear.elasticity.backlash import Backlash, BacklashAsPrinted, Teeth
-from gear.elasticity.law import as_law
-from gear.elasticity.periodic import PeriodicStiffness
-from gear.elasticity.tooth_faults import ToothFaults
+from gear.elasticity.law import ElasticityLaw
 from gear.motion import MeshMotion
 from gear.quantities import Angle, Distance, Scalar, check, check_count
+from gear.quantities.registry import part
+from gear.teeth.pair import Pair
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,8 +53,9 @@ class ErrorHarmonic:
         return -self.amplitude * self.order * ca.sin(self.order * turn + self.phase) * speed
 
 
+@part(ElasticityLaw)
 @dataclass(frozen=True, kw_only=True)
-class TransmissionError:
+class TransmissionError(ElasticityLaw):
     """A law that feels the deflection plus the errors of the wheels; the gap closes and opens by it, too.
 
         F_n of the law at   deflection + sum of e,   rate + sum of e'
@@ -71,14 +71,13 @@ class TransmissionError:
 
     Parameters
     ----------
-    law : Linear, ProgressiveISO, ProgressiveNiemann, Backlash, BacklashAsPrinted, PeriodicStiffness or ToothFaults
-        Elasticity of the teeth. (Errors, faults and periodic stiffness give the same force in any order; files have
-        the errors outside and the periodic stiffness inside.)
+    law : ElasticityLaw
+        Elasticity of the teeth. Errors, faults and periodic stiffness give the same force in any order.
     harmonics : mapping of str to ErrorHarmonic
         By name.
     """
 
-    law: Teeth | Backlash | BacklashAsPrinted | PeriodicStiffness | ToothFaults
+    law: ElasticityLaw
     harmonics: Mapping[str, ErrorHarmonic]
 
     def shifted(self, motion: MeshMotion) -> MeshMotion:
@@ -88,18 +87,22 @@ class TransmissionError:
             rate=motion.rate + sum(harmonic.rate(motion) for harmonic in self.harmonics.values()),
         )
 
+    def require_pair(self, pair: Pair) -> None:
+        """Raise ValueError where the law has no meaning for the teeth of a pair."""
+        self.law.require_pair(pair)
+
     def force(self, motion: MeshMotion, flank: Scalar) -> Scalar:
         """Normal force [N], positive when A pushes B towards positive travel."""
-        return as_law(self.law).force(self.shifted(motion), flank)
+        return self.law.force(self.shifted(motion), flank)
 
     def stored(self, motion: MeshMotion, flank: Scalar) -> Scalar:
         """Integral of the elastic force over the deflection, at the present turn of the wheels [J]."""
-        return as_law(self.law).stored(self.shifted(motion), flank)
+        return self.law.stored(self.shifted(motion), flank)
 
     def penetration(self, motion: MeshMotion, flank: Scalar) -> Scalar:
         """How far the teeth are pressed into each other on a flank [m]; None without a gap."""
-        return as_law(self.law).penetration(self.shifted(motion), flank)
+        return self.law.penetration(self.shifted(motion), flank)
 
     def nominal_force(self) -> Scalar:
         """Size of a usual normal force [N], that of the law."""
-        return as_law(self.law).nominal_force()
+        return self.law.nominal_force()

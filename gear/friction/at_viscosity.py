@@ -2,15 +2,17 @@
 
 from dataclasses import dataclass
 
-from gear.friction.over_speed import FrictionTable, Stribeck
-from gear.friction.tabulated_efficiency import TabulatedEfficiency
-from gear.lubrication.lubricant import Lubricants
+from gear.friction.law import FrictionLaw, SpeedLaw
+from gear.lubrication.law import Lubricant
 from gear.motion import Sliding
 from gear.quantities import Scalar
+from gear.quantities.registry import part
+from gear.teeth.pair import Pair
 
 
+@part(FrictionLaw)
 @dataclass(frozen=True, kw_only=True)
-class AtViscosity:
+class AtViscosity(FrictionLaw):
     """A law over speed, at the viscosity of a lubricant that is not the one it was measured with.
 
         mu(v) = law(v eta / eta_measured)
@@ -21,11 +23,11 @@ class AtViscosity:
 
     Parameters
     ----------
-    law : Stribeck, FrictionTable or TabulatedEfficiency
+    law : SpeedLaw
         As measured.
-    lubricant : GivenViscosity or OilAt
+    lubricant : Lubricant
         In the mesh.
-    measured_with : GivenViscosity or OilAt
+    measured_with : Lubricant
         During the measurement.
 
     References
@@ -33,9 +35,13 @@ class AtViscosity:
     M. D. Hersey, "The laws of lubrication of horizontal journal bearings", J. Washington Acad. Sci. 4 (1914), 542-552.
     """
 
-    law: Stribeck | FrictionTable | TabulatedEfficiency
-    lubricant: Lubricants
-    measured_with: Lubricants
+    law: SpeedLaw
+    lubricant: Lubricant
+    measured_with: Lubricant
+
+    def require_pair(self, pair: Pair) -> None:
+        """Raise ValueError where the law has no meaning for the teeth of a pair."""
+        self.law.require_pair(pair)
 
     def _measured(self, sliding: Sliding) -> Sliding:
         """The state of the measurement with the same film."""

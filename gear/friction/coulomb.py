@@ -3,13 +3,16 @@
 from dataclasses import dataclass
 from typing import Annotated
 
+from gear.friction.law import FrictionLaw, require_breakaway_above
 from gear.motion import Sliding
 from gear.quantities import Coefficient, Scalar, check
+from gear.quantities.registry import part
 from gear.quantities.roles import Breakaway, SlidingFriction
 
 
+@part(FrictionLaw)
 @dataclass(frozen=True, kw_only=True)
-class Coulomb:
+class Coulomb(FrictionLaw):
     """Constant sliding friction with its own breakaway value.
 
         mu(v) = sliding for v > 0,    mu(0) = static
@@ -30,11 +33,7 @@ class Coulomb:
 
     def __post_init__(self) -> None:
         check(self)
-        if self.static < self.sliding:
-            raise ValueError(
-                f"Coulomb needs sliding <= static, got sliding={self.sliding:g} and static={self.static:g}; "
-                "a breakaway coefficient below the sliding one has no consistent motion at standstill"
-            )
+        require_breakaway_above("Coulomb", ("sliding", self.sliding), ("static", self.static))
 
     def coefficient(self, sliding: Sliding) -> Scalar:
         """Sliding coefficient [-], the same everywhere."""

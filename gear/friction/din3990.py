@@ -5,18 +5,21 @@ from typing import Annotated
 
 import casadi as ca
 
-from gear.lubrication.lubricant import Lubricants
+from gear.friction.law import FrictionLaw
+from gear.lubrication.law import Lubricant
 from gear.motion import Sliding
 from gear.quantities import Length, PositiveCoefficient, Scalar, Share, check
+from gear.quantities.registry import part
 from gear.quantities.roles import Breakaway
-from gear.teeth.geometry import Pair
+from gear.teeth.pair import Pair
 
 FORCE_FLOOR = 1e-3  # N; below it the coefficient is constant, as its slope over the force is infinite at zero
 SI = 1e-3  # the bracket with N/mm, um, mPa s, m/s, mm over the one with N/m, m, Pa s, m/s, m: 1e-3 1e6 / (1e3 1e3)
 
 
+@part(FrictionLaw)
 @dataclass(frozen=True, kw_only=True)
-class Din3990:
+class Din3990(FrictionLaw):
     """Mean coefficient of friction of lubricated teeth by DIN 3990-4, never above the static one.
 
         mu = min(static, 0.12 (w_bt R_a / (eta v_sum rho_redC))^0.25)
@@ -38,7 +41,7 @@ class Din3990:
     ----------
     static : float
         Coefficient at standstill and cap [-].
-    lubricant : GivenViscosity or OilAt
+    lubricant : Lubricant
         Viscosity, or an oil at a temperature.
     roughness : float
         Arithmetic mean roughness R_a of the flanks [m].
@@ -54,7 +57,7 @@ class Din3990:
     """
 
     static: Annotated[PositiveCoefficient, Breakaway(floor=None)]  # it caps sliding too, so the two never part
-    lubricant: Lubricants
+    lubricant: Lubricant
     roughness: Length
     face_width: Length
     effective_width: Share = 1.0

@@ -5,8 +5,8 @@ from typing import Annotated
 
 import casadi as ca
 
-from gear.friction.speed_axis import require_axis
-from gear.friction.tables import piecewise_linear
+from gear.friction.law import SpeedLaw, require_breakaway_above
+from gear.friction.tables import piecewise_linear, require_axis
 from gear.motion import Sliding
 from gear.quantities import (
     AtLeastOne,
@@ -17,13 +17,15 @@ from gear.quantities import (
     ViscousCoefficient,
     check,
 )
+from gear.quantities.registry import part
 from gear.quantities.roles import Breakaway, SlidingFriction
 
 SPEED_FLOOR = 1e-12  # m/s, added to the speed: keeps the logarithm in the slope over the exponent finite
 
 
+@part(SpeedLaw)
 @dataclass(frozen=True, kw_only=True)
-class Stribeck:
+class Stribeck(SpeedLaw):
     """Friction that falls from its static value over the Stribeck speed and rises with viscous drag.
 
         mu(v) = coulomb + (static - coulomb) exp(-(v/stribeck_speed)^exponent) + viscous v
@@ -60,11 +62,7 @@ class Stribeck:
 
     def __post_init__(self) -> None:
         check(self)
-        if self.static < self.coulomb:
-            raise ValueError(
-                f"Stribeck needs coulomb <= static, got coulomb={self.coulomb:g} and static={self.static:g}; "
-                "a breakaway coefficient below the sliding one has no consistent motion at standstill"
-            )
+        require_breakaway_above("Stribeck", ("coulomb", self.coulomb), ("static", self.static))
 
     def coefficient(self, sliding: Sliding) -> Scalar:
         """Sliding coefficient [-]."""
@@ -95,8 +93,9 @@ class FrictionPoint:
         check(self)
 
 
+@part(SpeedLaw)
 @dataclass(frozen=True, kw_only=True)
-class FrictionTable:
+class FrictionTable(SpeedLaw):
     """Friction coefficients over mesh speed, linear between the points and constant beyond the last.
 
     Parameters
@@ -113,11 +112,7 @@ class FrictionTable:
     def __post_init__(self) -> None:
         check(self)
         require_axis("FrictionTable", [point.speed for point in self.points])
-        if self.static < self.onset:
-            raise ValueError(
-                f"FrictionTable needs points[0].coefficient <= static, got {self.onset:g} and static={self.static:g}; "
-                "a breakaway coefficient below the sliding one has no consistent motion at standstill"
-            )
+        require_breakaway_above("FrictionTable", ("points[0].coefficient", self.onset), ("static", self.static))
 
     @property
     def onset(self) -> float:

@@ -1,22 +1,19 @@
 """Friction that changes with the position of the teeth, on top of any other law."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from gear.friction.at_viscosity import AtViscosity
-from gear.friction.coulomb import Coulomb
-from gear.friction.din3990 import Din3990
-from gear.friction.over_speed import FrictionTable, Stribeck
-from gear.friction.tabulated_efficiency import TabulatedEfficiency
+from gear.friction.law import FrictionLaw
 from gear.harmonics import Harmonic, lowest_factor, pitch_of, tooth_factor
 from gear.motion import Sliding
-from gear.quantities import Length, Scalar, check
-from gear.teeth.geometry import Pair
+from gear.quantities import Length, Memory, Scalar, check
+from gear.quantities.registry import part
+from gear.teeth.pair import Pair
 
-UniformFriction = Coulomb | Din3990 | TabulatedEfficiency | Stribeck | FrictionTable | AtViscosity
 
-
+@part(FrictionLaw)
 @dataclass(frozen=True, kw_only=True)
-class PeriodicFriction:
+class PeriodicFriction(FrictionLaw):
     """Any law of friction times a factor that repeats with every tooth.
 
         mu = law * factor(x),     factor = 1 + sum_k (cosine_k cos(2 pi k x/pitch) + sine_k sin(2 pi k x/pitch))
@@ -27,7 +24,7 @@ class PeriodicFriction:
 
     Parameters
     ----------
-    law : Coulomb, Din3990, TabulatedEfficiency, Stribeck, FrictionTable or AtViscosity
+    law : FrictionLaw
         The mean over a tooth.
     harmonics : tuple of Harmonic
         First, second, ... over one tooth. Its numbers stay constants of a model; they are not parameters.
@@ -44,7 +41,7 @@ class PeriodicFriction:
     F. L. J. van der Linden, "Modeling of geared positioning systems", section "Friction models".
     """
 
-    law: UniformFriction
+    law: FrictionLaw
     harmonics: tuple[Harmonic, ...]
     pitch: Length | None = None
 
@@ -59,6 +56,7 @@ class PeriodicFriction:
     def require_pair(self, pair: Pair) -> None:
         """Raise ValueError where neither the law nor a pair says the pitch."""
         pitch_of(self, pair)
+        self.law.require_pair(pair)
 
     def factor(self, position: Scalar, pair: Pair | None = None) -> Scalar:
         """Factor [-] at a feed [m]."""
@@ -71,3 +69,20 @@ class PeriodicFriction:
     def breakaway(self, sliding: Sliding) -> Scalar:
         """Coefficient [-] that holds the mesh at rest."""
         return self.factor(sliding.position, sliding.pair) * self.law.breakaway(sliding)
+
+    @property
+    def sticks(self) -> bool:
+        """Whether the law does."""
+        return self.law.sticks
+
+    def memory(self) -> tuple[Memory, ...]:
+        """The internal state of the law."""
+        return self.law.memory()
+
+    def friction(self, memory: Sequence[Scalar], sliding: Sliding) -> Scalar:
+        """Friction over normal force [-], of a law that does not stick."""
+        return self.factor(sliding.position, sliding.pair) * self.law.friction(memory, sliding)
+
+    def rates(self, memory: Sequence[Scalar], sliding: Sliding) -> list[Scalar]:
+        """Time derivative of the internal state of the law."""
+        return self.law.rates(memory, sliding)

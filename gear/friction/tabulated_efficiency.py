@@ -5,12 +5,13 @@ from typing import Annotated
 
 import casadi as ca
 
-from gear.friction.speed_axis import require_axis
-from gear.friction.tables import piecewise_linear
+from gear.friction.law import SpeedLaw
+from gear.friction.tables import piecewise_linear, require_axis
 from gear.motion import Sliding
 from gear.quantities import AtLeastOne, MeshSpeed, Scalar, Share, check
+from gear.quantities.registry import part
 from gear.quantities.roles import Breakaway
-from gear.teeth.geometry import Pair
+from gear.teeth.pair import Pair
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,8 +34,9 @@ class EfficiencyPoint:
         check(self)
 
 
+@part(SpeedLaw)
 @dataclass(frozen=True, kw_only=True)
-class TabulatedEfficiency:
+class TabulatedEfficiency(SpeedLaw):
     """Friction coefficients that give a mesh exactly the efficiencies of a table.
 
     The efficiency is linear between the points and constant beyond the last. The torques of the mesh,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from gear.lubrication.lubricant import Lubricants
+from gear.lubrication.law import Lubricant
 from gear.quantities import Exponent, Factor, Length, Scalar, check
 
 BOUNDARY = 2000.0  # mm^2/s times 1/min, below which Palmgren's torque no longer falls
@@ -31,8 +31,8 @@ class Palmgren:
         Mean diameter of the bearing d_m [m].
     factor : float
         f_0, by type of bearing and lubrication [-]: about 1 to 10, from the tables of the maker.
-    lubricant : GivenViscosity with its density, or OilAt
-        The oil, or the base oil of the grease.
+    lubricant : Lubricant
+        With its density: the oil, or the base oil of the grease.
 
     References
     ----------
@@ -42,7 +42,7 @@ class Palmgren:
 
     diameter: Length
     factor: Factor
-    lubricant: Lubricants
+    lubricant: Lubricant
 
     def __post_init__(self) -> None:
         check(self)
@@ -62,9 +62,9 @@ class Thickening:
 
     Parameters
     ----------
-    lubricant : GivenViscosity or OilAt
+    lubricant : Lubricant
         In use.
-    measured_with : GivenViscosity or OilAt
+    measured_with : Lubricant
         During the measurement.
     exponent : float
         0 to 1 [-]: 1 for oil that is sheared in a gap, as in plain bearings and seals (Petroff); 2/3 for rolling
@@ -75,8 +75,8 @@ class Thickening:
     N. P. Petrov, "Friction in machines and the effect of the lubricant" (1883).
     """
 
-    lubricant: Lubricants
-    measured_with: Lubricants
+    lubricant: Lubricant
+    measured_with: Lubricant
     exponent: Exponent = 1.0
 
     def __post_init__(self) -> None:

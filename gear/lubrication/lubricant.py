@@ -4,10 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Annotated, Any, Literal, TypeVar
 
+from gear.lubrication.law import Lubricant, OilProperties
 from gear.lubrication.oil import Oil
 from gear.lubrication.viscosity import Vogel, Walther
-from gear.quantities import Density, DynamicViscosity, Scalar, Temperature, check
-from gear.quantities.roles import OilTemperature
+from gear.quantities import Density, DynamicViscosity, Scalar, Temperature, annotations, check
+from gear.quantities.registry import part
+from gear.quantities.roles import OilTemperature, roles_in
 
 CELSIUS = 273.15  # K at 0 degC
 MM2 = 1e-6  # m^2
@@ -86,8 +88,9 @@ PENNZANE_X2000 = Oil(
 OILS = {oil.name: oil for oil in (MOBIL_JET_OIL_II, XC_5606J, PENNZANE_X2000)}
 
 
+@part(OilProperties)
 @dataclass(frozen=True, kw_only=True)
-class KnownOil:
+class KnownOil(OilProperties):
     """One of the oils above by its name, for files; its numbers are not parameters.
 
     Parameters
@@ -111,8 +114,9 @@ class KnownOil:
         return OILS[self.name].kinematic_viscosity(temperature)
 
 
+@part(Lubricant)
 @dataclass(frozen=True, kw_only=True)
-class GivenViscosity:
+class GivenViscosity(Lubricant):
     """A lubricant of which only the viscosity is known.
 
     Parameters
@@ -140,19 +144,20 @@ class GivenViscosity:
         return self.viscosity / self.density
 
 
+@part(Lubricant)
 @dataclass(frozen=True, kw_only=True)
-class OilAt:
+class OilAt(Lubricant):
     """An oil at a temperature: cold start, room and warm are one argument.
 
     Parameters
     ----------
-    oil : Oil or KnownOil
+    oil : OilProperties
         Which.
     temperature : float
         [K]; within the range of the oil, as a parameter of a simulation too.
     """
 
-    oil: Oil | KnownOil
+    oil: OilProperties
     temperature: Annotated[Temperature, OilTemperature()]
 
     def __post_init__(self) -> None:
@@ -166,9 +171,6 @@ class OilAt:
     def kinematic_viscosity(self) -> Scalar:
         """[m^2/s]."""
         return self.oil.kinematic_viscosity(self.temperature)
-
-
-Lubricants = GivenViscosity | OilAt
 
 
 def at_temperature(part: Part, temperature: float) -> Part:
@@ -190,15 +192,20 @@ def at_temperature(part: Part, temperature: float) -> Part:
     return changed
 
 
+def oil_temperatures(part: Any) -> list[str]:
+    """Names of the fields of a component that are the temperature of its oil."""
+    found = annotations(part).items()
+    return [name for name, notes in found if any(isinstance(role, OilTemperature) for role in roles_in(notes))]
+
+
 def _at(part: Any, temperature: float) -> Any:
-    if isinstance(part, OilAt):
-        return replace(part, temperature=temperature)
     if isinstance(part, Mapping):
         items = {name: _at(item, temperature) for name, item in part.items()}
         return items if any(items[name] is not item for name, item in part.items()) else part
     if not is_dataclass(part) or isinstance(part, type):
         return part
     old = {field.name: getattr(part, field.name) for field in fields(part) if field.name != MEASURED}
-    new = {name: _at(value, temperature) for name, value in old.items()}
-    changes = {name: value for name, value in new.items() if value is not old[name]}
+    own = oil_temperatures(part)
+    new = {name: temperature if name in own else _at(value, temperature) for name, value in old.items()}
+    changes = {name: value for name, value in new.items() if name in own or value is not old[name]}
     return replace(part, **changes) if changes else part

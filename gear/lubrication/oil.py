@@ -3,14 +3,16 @@
 from dataclasses import dataclass
 from numbers import Real
 
-from gear.lubrication.viscosity import Vogel, Walther
+from gear.lubrication.law import OilProperties, ViscosityLaw
 from gear.quantities import Density, Expansion, Scalar, Temperature, check
+from gear.quantities.registry import part
 
 ROUNDING = 1e-6  # K; a temperature converted from degC may miss the end of the range by rounding
 
 
+@part(OilProperties)
 @dataclass(frozen=True, kw_only=True)
-class Oil:
+class Oil(OilProperties):
     """A lubricant between its lowest and highest temperature.
 
         density(T) = density (1 - expansion (T - density_temperature))
@@ -18,7 +20,7 @@ class Oil:
 
     Parameters
     ----------
-    law : Walther or Vogel
+    law : ViscosityLaw
         Viscosity over temperature.
     density : float
         At `density_temperature` [kg/m^3].
@@ -37,7 +39,7 @@ class Oil:
         Where a number out of the range is asked for. An expression is not held against the range.
     """
 
-    law: Walther | Vogel
+    law: ViscosityLaw
     density: Density
     density_temperature: Temperature
     expansion: Expansion

@@ -1,33 +1,20 @@
 """Laws of viscosity over temperature, through the points of a data sheet."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import casadi as ca
 
+from gear.lubrication.law import DensityLaw, ViscosityLaw
 from gear.quantities import KinematicViscosity, Scalar, Temperature, check, show
+from gear.quantities.registry import part
 
 SQUARE_MILLIMETER = 1e-6  # m^2; the viscosities of ASTM D341 are in mm^2/s
 THINNEST = 2e-6  # m^2/s, below which ASTM D341 needs further terms
 
-DensityLaw = Callable[[Scalar], Scalar]  # [kg/m^3] from temperature [K]
 
-
-class ViscosityLaw(Protocol):
-    """What an oil asks of its law of viscosity."""
-
-    def dynamic_viscosity(self, temperature: Scalar, density: DensityLaw) -> Scalar:
-        """[Pa s] at a temperature [K], for an oil with this density over temperature."""
-        ...
-
-    def lowest(self, density: DensityLaw) -> Scalar:
-        """Temperature [K] down to which the law has a finite viscosity."""
-        ...
-
-
+@part(ViscosityLaw)
 @dataclass(frozen=True, kw_only=True)
-class Walther:
+class Walther(ViscosityLaw):
     """Kinematic viscosity through two points.
 
         lg lg(nu + 0.7) = A - B lg T            nu in mm^2/s, T in K
@@ -74,8 +61,9 @@ class Walther:
         return 0.0
 
 
+@part(ViscosityLaw)
 @dataclass(frozen=True, kw_only=True)
-class Vogel:
+class Vogel(ViscosityLaw):
     """Dynamic viscosity through three points.
 
         eta = a exp(b / (T - c))                c < T

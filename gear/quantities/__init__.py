@@ -28,6 +28,7 @@ from gear.quantities.units import Inertia as Inertia
 from gear.quantities.units import KinematicViscosity as KinematicViscosity
 from gear.quantities.units import Length as Length
 from gear.quantities.units import Matrix as Matrix
+from gear.quantities.units import Memory as Memory
 from gear.quantities.units import MeshSpeed as MeshSpeed
 from gear.quantities.units import Number as Number
 from gear.quantities.units import Part as Part

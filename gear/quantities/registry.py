@@ -40,7 +40,7 @@ def part(*slots: type, default: bool = False) -> Callable[[Part], Part]:
     """
 
     def register(made: Part) -> Part:
-        for slot in dict.fromkeys(base for slot in slots for base in _refined(slot)):
+        for slot in dict.fromkeys(base for named in slots for base in _refined(named)):
             require_contract(made, slot)
             kinds = _parts.setdefault(slot, {})
             taken = kinds.get(made.__name__)

@@ -6,7 +6,7 @@ is declared in the same place, by a role (`gear.quantities.roles`).
 """
 
 import math
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 from annotated_types import Ge, Gt, Le, Lt, Unit
 
@@ -42,3 +42,12 @@ Expansion = Annotated[float, Unit("1/K"), Ge(0)]
 Angle = Annotated[float, Unit("rad")]
 Force = Annotated[float, Unit("N"), Gt(0)]
 Part = Annotated[float, Unit("-"), Gt(0), Lt(1)]
+
+
+class Memory(NamedTuple):
+    """One number that a law keeps from one instant to the next."""
+
+    name: str
+    unit: str
+    nominal: float  # usual size, for the error control
+    initial: float = 0.0

@@ -1,62 +1,16 @@
-"""Gear pairs as a mesh sees them, and external involute pairs from their teeth. Rings: see `gear.teeth.internal`."""
+"""External involute pairs from their teeth, and pairs from given numbers. Rings: see `gear.teeth.internal`."""
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar
 
 from gear.quantities import Arm, HelixAngle, Length, Number, PressureAngle, Scalar, check, show
+from gear.quantities.registry import part
+from gear.teeth.pair import Pair
 from gear.teeth.toothed_pair import ToothedPair
 
 
-class Pair(Protocol):
-    """What a mesh asks of a gear pair, however the numbers were obtained.
-
-    Working pitch radii [m] (a ring gear B has a negative one), working pressure angle and base helix angle [rad],
-    and the averaged constants of the friction: the lever arms `friction_arm_a`, `friction_arm_b` [m] on the wheels
-    and the `friction_factor` [-] on the bearings.
-    """
-
-    @property
-    def radius_a(self) -> Scalar:
-        """Working pitch radius [m] of wheel A."""
-        ...
-
-    @property
-    def radius_b(self) -> Scalar:
-        """Working pitch radius [m] of wheel B, negative for a ring."""
-        ...
-
-    @property
-    def working_angle(self) -> Scalar:
-        """Working transverse pressure angle [rad]."""
-        ...
-
-    @property
-    def base_helix_angle(self) -> Scalar:
-        """Helix angle at the base cylinders, beta_b [rad]."""
-        ...
-
-    @property
-    def tooth_pitch(self) -> Scalar | None:
-        """Feed from tooth to tooth on the working pitch circles [m]; None where the teeth are not known."""
-        ...
-
-    @property
-    def friction_factor(self) -> Scalar:
-        """d_F [-]."""
-        ...
-
-    @property
-    def friction_arm_a(self) -> Scalar:
-        """-d_tauA [m]."""
-        ...
-
-    @property
-    def friction_arm_b(self) -> Scalar:
-        """d_tauB [m]."""
-        ...
-
-
+@part(Pair)
 @dataclass(frozen=True, kw_only=True)
 class ExternalPair(ToothedPair):
     """External involute pair, spur or helical, with or without profile shift, at its distance without backlash.
@@ -91,7 +45,7 @@ class ExternalPair(ToothedPair):
     Raises
     ------
     ValueError
-        Where the teeth cannot be cut or cannot mesh, see `gear.tooth_checks.require_possible`.
+        Where the teeth cannot be cut or cannot mesh, see `gear.teeth.checks.require_possible`.
 
     References
     ----------
@@ -99,6 +53,7 @@ class ExternalPair(ToothedPair):
     """
 
 
+@part(Pair)
 @dataclass(frozen=True, kw_only=True)
 class GivenPair:
     """A gear pair whose averaged constants are given as numbers, not computed from teeth.
@@ -131,6 +86,8 @@ class GivenPair:
     base_helix_angle: HelixAngle = 0.0
     tooth_pitch: Length | None = None
 
+    sticks_by_mesh_speed: ClassVar[bool] = True
+
     def __post_init__(self) -> None:
         check(self)
         if -self.radius_a <= self.radius_b <= 0:
@@ -143,3 +100,7 @@ class GivenPair:
     def working_angle(self) -> Scalar:
         """The given pressure angle [rad]."""
         return self.pressure_angle
+
+    def size(self) -> str:
+        """Its radii."""
+        return f"{1e3 * self.radius_a:.4g} : {1e3 * self.radius_b:.4g} mm"

@@ -2,9 +2,12 @@
 
 from dataclasses import dataclass
 
+from gear.quantities.registry import part
+from gear.teeth.pair import Pair
 from gear.teeth.toothed_pair import ToothedPair
 
 
+@part(Pair)
 @dataclass(frozen=True, kw_only=True)
 class InternalPair(ToothedPair):
     """Wheel A inside a ring gear B, spur or helical, at the distance without backlash.
@@ -43,7 +46,7 @@ class InternalPair(ToothedPair):
     Raises
     ------
     ValueError
-        Where the teeth cannot be cut or cannot mesh, see `gear.tooth_checks.require_possible`.
+        Where the teeth cannot be cut or cannot mesh, see `gear.teeth.checks.require_possible`.
 
     References
     ----------

@@ -2,12 +2,16 @@
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import casadi as ca
 
 from gear.quantities import HelixAngle, Length, Scalar, check
+from gear.quantities.registry import part
+from gear.teeth.pair import Pair
 
 
+@part(Pair)
 @dataclass(frozen=True, kw_only=True)
 class ScrewPair:
     """Spindle A and nut B of a screw, for a mesh that sticks by "conjugate speed".
@@ -45,6 +49,8 @@ class ScrewPair:
     mean_radius: Length
     lead: Length
     flank_angle: HelixAngle = 0.0
+
+    sticks_by_mesh_speed: ClassVar[bool] = False  # it rubs along its slope
 
     def __post_init__(self) -> None:
         check(self)
@@ -93,3 +99,7 @@ class ScrewPair:
     def tooth_pitch(self) -> None:
         """None: a thread has no teeth that come and go."""
         return None
+
+    def size(self) -> str:
+        """Its lead."""
+        return f"screw of lead {1e3 * self.lead:.4g} mm"

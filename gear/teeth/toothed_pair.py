@@ -26,6 +26,7 @@ class ToothedPair:
     tip_radius_a: Length | None = None
     tip_radius_b: Length | None = None
 
+    sticks_by_mesh_speed: ClassVar[bool] = True
     side_b: ClassVar[int] = 1  # -1 where B is a ring, whose teeth and radii count negative
 
     def __post_init__(self) -> None:
@@ -95,3 +96,7 @@ class ToothedPair:
     def contact_ratio(self) -> Scalar:
         """Average number of tooth pairs in contact in one plane [-]."""
         return self.gearing.contact_ratio()
+
+    def size(self) -> str:
+        """Its numbers of teeth."""
+        return f"{self.teeth_a} : {self.teeth_b}"

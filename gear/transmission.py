@@ -153,7 +153,7 @@ class Transmission:
                     mesh.slip_per_shaft(),
                     mesh.torque_per_friction(),
                     MESH_SPEED_NOMINAL,
-                    mesh.count * mesh.law().nominal_force(),
+                    mesh.count * mesh.law().force_scale(),
                 )
                 for name, mesh in self.meshes.items()
                 if mesh.a == shaft and mesh.friction is not None

@@ -272,7 +272,7 @@ def test_there_is_no_force_in_the_gap(law, motion):
 @elastic
 def test_usual_force_is_that_of_a_micrometer_of_sound_teeth(law):
     spring = next(part for part in (NIEMANN, *SPRINGS) if str(part) in str(law))
-    assert law.nominal_force() == spring.spring(1e-6)
+    assert law.force_scale() == spring.spring(1e-6)
 
 
 # -- backlash -----------------------------------------------------------------------------------------

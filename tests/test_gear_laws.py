@@ -184,7 +184,7 @@ def test_only_backlash_has_a_gap():
 
 @elastic
 def test_usual_force_is_that_of_a_micrometer(law):
-    assert law.nominal_force() == pytest.approx(force(law, engaged(law, 1e-6, 1.0), 0.0, 1.0))
+    assert law.force_scale() == pytest.approx(force(law, engaged(law, 1e-6, 1.0), 0.0, 1.0))
 
 
 # -- friction -----------------------------------------------------------------------------------------

@@ -200,3 +200,17 @@ def test_what_the_refined_slot_asks_is_asked_and_attributes_are_declared():
         part(Damper)(type("Thing", (Damper,), {"loss": lambda self, rate: 0.0, "sealed": True}))
     with pytest.raises(PartError, match="Thing is no Damper: it does not declare sealed"):
         part(Damper)(type("Thing", (Damper,), {"force": lambda self, stretch: 0.0, "loss": lambda self, rate: 0.0}))
+
+
+def test_a_field_does_not_take_the_place_of_a_method():
+    with pytest.raises(PartError, match="Thing is no Spring: energy is no method"):
+
+        @part(Spring)
+        @dataclass(frozen=True, kw_only=True)
+        class Thing(Spring):
+            """Its energy is a number."""
+
+            energy: Annotated[float, Unit("J")]
+
+            def force(self, stretch):
+                return stretch

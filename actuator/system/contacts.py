@@ -245,7 +245,7 @@ class ContactMechanics:
             flank = modes.flank[path]
             if path not in self.gapped:
                 name = path.removeprefix("meshes.")
-                usual = self.laws[path].nominal_force() * self.gear.meshes[name].count
+                usual = self.laws[path].force_scale() * self.gear.meshes[name].count
                 rows.append(flank * forces.normal[name] / usual)
                 continue
             for side in (1, -1):

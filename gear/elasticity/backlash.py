@@ -63,7 +63,7 @@ class Backlash(ElasticityLaw):
         """How far the teeth are pressed into each other on a flank [m]."""
         return flank * motion.deflection - self.gap / 2
 
-    def nominal_force(self) -> Scalar:
+    def force_scale(self) -> Scalar:
         """Force [N] at one micrometer beyond the gap."""
         return self.law.spring(DEFLECTION_NOMINAL)
 
@@ -110,6 +110,6 @@ class BacklashAsPrinted(ElasticityLaw):
         """How far the teeth are pressed into each other on a flank [m]."""
         return flank * motion.deflection - self.gap / 2
 
-    def nominal_force(self) -> Scalar:
+    def force_scale(self) -> Scalar:
         """Force [N] at one micrometer beyond the gap."""
         return self.law.spring(DEFLECTION_NOMINAL)

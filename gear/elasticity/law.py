@@ -38,7 +38,7 @@ class ElasticityLaw(Protocol):
         """
 
     @abstractmethod
-    def nominal_force(self) -> Scalar:
+    def force_scale(self) -> Scalar:
         """Size of a usual normal force [N], for scaling."""
 
     def require_pair(self, pair: Pair) -> None:
@@ -75,7 +75,7 @@ class ToothSpring(ElasticityLaw, Protocol):
         """None: the teeth are always in contact."""
         return None
 
-    def nominal_force(self) -> Scalar:
+    def force_scale(self) -> Scalar:
         """Force [N] at a deflection of one micrometer."""
         return self.spring(DEFLECTION_NOMINAL)
 

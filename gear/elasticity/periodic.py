@@ -84,6 +84,6 @@ class PeriodicStiffness(ElasticityLaw):
         """How far the teeth are pressed into each other on a flank [m]; None without a gap."""
         return self.law.penetration(motion, flank)
 
-    def nominal_force(self) -> Scalar:
+    def force_scale(self) -> Scalar:
         """Size of a usual normal force [N], that of the law."""
-        return self.law.nominal_force()
+        return self.law.force_scale()

@@ -43,7 +43,7 @@ class FrictionLaw(Protocol):
 
     def friction(self, memory: Sequence[Scalar], sliding: Sliding) -> Scalar:
         """Friction over normal force [-], with the sign of the motion that it opposes; of a law that does not stick."""
-        raise NotImplementedError(f"{type(self).__name__}.friction: a law that sticks has no friction without a mode")
+        raise TypeError(f"{type(self).__name__}.friction: a law that sticks has no friction without a mode")
 
     def rates(self, memory: Sequence[Scalar], sliding: Sliding) -> list[Scalar]:
         """Time derivative of the internal state."""

@@ -130,7 +130,7 @@ def require_contract(made: type, slot: type) -> None:
 
 def _require_signature(made: type, slot: type, name: str, asked: Callable[..., Any]) -> None:
     given = getattr(made, name)
-    if not callable(given):
+    if not callable(given) or name in getattr(made, "__dataclass_fields__", {}):
         raise PartError(f"{made.__name__} is no {slot.__name__}: {name} is no method")
     wanted, found = inspect.signature(asked).parameters, inspect.signature(given).parameters
     extra = [key for key, value in found.items() if key not in wanted and value.default is value.empty]

@@ -1,6 +1,6 @@
 """What a mesh asks of its pair of wheels. A new kind of pair is a new file in this folder."""
 
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 from gear.quantities import Scalar
 
@@ -15,7 +15,7 @@ class Pair(Protocol):
     Its parts do not name it as their base, as a field of a dataclass cannot take the place of a property.
     """
 
-    sticks_by_mesh_speed: bool  # whether friction may oppose the mesh speed, which a thread does not slide along
+    sticks_by_mesh_speed: ClassVar[bool]  # whether friction may oppose the mesh speed; a thread slides along its slope
 
     @property
     def radius_a(self) -> Scalar:
@@ -51,3 +51,4 @@ class Pair(Protocol):
 
     def size(self) -> str:
         """Its size in words, for tables: numbers of teeth, or what it has instead."""
+        ...

@@ -8,12 +8,12 @@ from actuator.continuation.boundary import Stretch as Stretch
 from actuator.continuation.boundary import hunting_boundary as hunting_boundary
 from actuator.continuation.branch import Branch as Branch
 from actuator.continuation.continuation import follow as follow
-from actuator.describing.check import DescribedHunting as DescribedHunting
-from actuator.describing.check import described_hunting as described_hunting
+from actuator.describing.check import DescribingCheck as DescribingCheck
+from actuator.describing.check import check_describing_function as check_describing_function
 from actuator.describing.describing import PredictedCycle as PredictedCycle
 from actuator.describing.describing import StageResponse as StageResponse
-from actuator.describing.describing import gear_stage as gear_stage
-from actuator.describing.describing import predicted_cycles as predicted_cycles
+from actuator.describing.describing import predict_cycles as predict_cycles
+from actuator.describing.describing import stage_response as stage_response
 from actuator.diagnosis.causes import find_causes as find_causes
 from actuator.diagnosis.countermeasures import find_remedies as find_remedies
 from actuator.diagnosis.cycle_energy import energy_per_cycle as energy_per_cycle
@@ -115,11 +115,11 @@ from actuator.simulation.signals import Step as Step
 from actuator.simulation.signals import Sum as Sum
 from actuator.simulation.signals import Table as Table
 from actuator.simulation.simulate import simulate as simulate
+from actuator.stiction.breakaway import BreakawayPrediction as BreakawayPrediction
 from actuator.stiction.breakaway import NotAtRest as NotAtRest
-from actuator.stiction.breakaway import Rest as Rest
-from actuator.stiction.breakaway import rest as rest
-from actuator.stiction.equilibrium_set import RestSet as RestSet
-from actuator.stiction.equilibrium_set import rest_set as rest_set
+from actuator.stiction.breakaway import predict_breakaway as predict_breakaway
+from actuator.stiction.equilibrium_set import EquilibriumSet as EquilibriumSet
+from actuator.stiction.equilibrium_set import find_equilibrium_set as find_equilibrium_set
 from actuator.stiction.margins import HuntingMargin as HuntingMargin
 from actuator.stiction.margins import hunting_margin as hunting_margin
 from actuator.stiction.margins import hunting_margins as hunting_margins
@@ -130,6 +130,15 @@ from actuator.verdict.verdict import classify as classify
 from actuator.verdict.verdict import decide as decide
 from gear.quantities import renamed as _renamed
 
-FORMER: dict[str, str] = {}  # until 0.3
+FORMER: dict[str, str] = {  # until 0.3
+    "DescribedHunting": "DescribingCheck",
+    "Rest": "BreakawayPrediction",
+    "RestSet": "EquilibriumSet",
+    "described_hunting": "check_describing_function",
+    "gear_stage": "stage_response",
+    "predicted_cycles": "predict_cycles",
+    "rest": "predict_breakaway",
+    "rest_set": "find_equilibrium_set",
+}
 __getattr__ = _renamed(__name__, FORMER)
 __version__ = "0.2.0"

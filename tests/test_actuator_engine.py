@@ -30,7 +30,7 @@ from actuator import (
 from actuator.simulation.compiled import compiler
 from actuator.simulation.engine import engine
 from actuator.simulation.prepared import EngineOptions
-from actuator.system.hybrid import Event, Mode, Quantity
+from actuator.system.hybrid import Contact, Event, Mode, Place, Quantity
 from actuator.system.parameters import Parameter
 from controllers import PID
 from gear import Bearing, Shaft, Transmission
@@ -51,6 +51,7 @@ def hybrid(*, flow, margins, reset, states=1, modes=1, name="by hand", parameter
         name=name,
         states=tuple(Quantity(f"x{k}", "m") for k in range(states)),
         mode_variables=tuple(Mode(f"contact{k}.motion") for k in range(modes)),
+        contacts=tuple(Contact(f"contact{k}", Place.MESH, f"contact{k}.motion", None, 1) for k in range(modes)),
         inputs=(Quantity("push", "N"),),
         outputs=(Quantity("double", "m"),),
         events=tuple(Event(f"margin {k}") for k in range(conditions.shape[0])),

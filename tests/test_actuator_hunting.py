@@ -29,7 +29,6 @@ from actuator import (
 from actuator.parts.sensors import AngleSensor, Sensors
 from actuator.simulation.run import Statistics
 from actuator.system.hybrid import Quantity
-from actuator.verdict.motion_record import stuck_fraction
 from actuator.verdict.peaks import find_turning_points
 from controllers import PID, Sampling
 from gear import Backlash, Bearing, Coulomb, Coupling, ExternalPair, Linear, Mesh, Shaft, Transmission
@@ -235,10 +234,10 @@ def test_turning_points_count_a_plateau_at_its_first_point():
     [(0.0, 10.0, 0.4), (1.5, 2.5, 0.5), (2.5, 4.5, 0.75), (4.03, 5.0, 0.0), (2.2, 3.3, 1.0)],
 )
 @pytest.mark.parametrize("points", [11, 101, 10_001])
-def test_the_stuck_fraction_comes_from_the_times_of_the_changes(start, end, expected, points):
+def test_the_stuck_share_comes_from_the_times_of_the_changes(start, end, expected, points):
     time = np.linspace(0, 10, points)
     run = run_of(time, time, changes=[(2.0, "stuck"), (4.0, "forward"), (8.0, "stuck")])
-    assert stuck_fraction(run, start, end) == pytest.approx(expected, abs=1e-12)
+    assert run.stuck_share(start, end) == pytest.approx(expected, abs=1e-12)
 
 
 # -- runs of simple systems ---------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from actuator import classify, find_orbit, rest, rest_set, simulate
+from actuator import classify, find_equilibrium_set, find_orbit, predict_breakaway, simulate
 from actuator.orbits.segments import passage
 from studies import load_case
 
@@ -93,8 +93,8 @@ def test_the_longest_standstill_of_the_aileron_lasts_as_long_as_its_drift_time()
     segment, start = orbit.segments[longest], orbit.starts[longest]
     names = [state.name for state in orbit.system.states]
     state = dict(zip(names, start, strict=True))
-    found = rest(aileron(), state, inputs={"reference": 0.1})
+    found = predict_breakaway(aileron(), state, inputs={"reference": 0.1})
     assert found.drift_time == pytest.approx(segment.duration, rel=1e-6)
-    held, outputs = rest_set(aileron(), state), [output.name for output in orbit.system.outputs]
+    held, outputs = find_equilibrium_set(aileron(), state), [output.name for output in orbit.system.outputs]
     values = orbit.system.outputs_function(start, segment.modes, orbit.u, orbit.p)
     assert held.lower < float(values[outputs.index("motor_torque")]) < held.upper

@@ -134,7 +134,7 @@ def changes(system, events):
     """Changes of mode of each contact as (contact, mode after), with their times, from all events."""
     found, times = [], []
     for (_, before), (time, after) in pairwise(events):
-        was, words = contact_labels(system.modes, before), contact_labels(system.modes, after)
+        was, words = contact_labels(system, before), contact_labels(system, after)
         new = [(contact, word) for contact, word in words.items() if word != was[contact]]
         found, times = found + new, times + [time] * len(new)
     return found, times

@@ -126,7 +126,7 @@ def _stands(orbit: Orbit) -> list[float]:
     """Durations of the stretches in which some contact sticks, in one sequence of modes."""
     found: list[float] = []
     for modes, group in itertools.groupby(orbit.segments, key=lambda segment: segment.modes):
-        if STUCK in contact_labels(orbit.system.modes, modes).values():
+        if STUCK in contact_labels(orbit.system, modes).values():
             found.append(sum(segment.duration for segment in group))
     return found
 

@@ -22,7 +22,7 @@ from actuator.describing.describing import (
     PredictedCycle,
     coulomb_friction,
     first_harmonic,
-    predicted_cycles,
+    predict_cycles,
 )
 from actuator.linear.model import linearize
 from actuator.linear.operating_point import OperatingPoint
@@ -37,7 +37,7 @@ REACH, CELLS = 1e3, 40  # how far below and above those of the orbit amplitudes 
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class DescribedHunting:
+class DescribingCheck:
     """A prediction by describing functions beside the exact orbit.
 
     Attributes
@@ -108,7 +108,7 @@ class DescribedHunting:
         return figure
 
 
-def described_hunting(plant: Actuator, orbit: Orbit | SampledOrbit) -> DescribedHunting:
+def check_describing_function(plant: Actuator, orbit: Orbit | SampledOrbit) -> DescribingCheck:
     """The prediction by describing functions for an actuator that is on a known orbit.
 
     Parameters
@@ -131,8 +131,8 @@ def described_hunting(plant: Actuator, orbit: Orbit | SampledOrbit) -> Described
     harmonics = _harmonics(orbit)
     amplitudes = harmonics[0] * np.geomspace(1 / REACH, REACH, CELLS)
     frequencies = 2 * np.pi / orbit.period * np.geomspace(1 / REACH, REACH, CELLS + 1)
-    cycles = predicted_cycles(loop, coulomb_friction(coulomb), amplitudes, frequencies)
-    return DescribedHunting(orbit=orbit, loop=loop, coulomb=coulomb, cycles=tuple(cycles), harmonics=harmonics)
+    cycles = predict_cycles(loop, coulomb_friction(coulomb), amplitudes, frequencies)
+    return DescribingCheck(orbit=orbit, loop=loop, coulomb=coulomb, cycles=tuple(cycles), harmonics=harmonics)
 
 
 def _at_load(point: OperatingPoint) -> float:

@@ -77,7 +77,7 @@ class StageResponse:
     run: Run = field(repr=False)
 
 
-def gear_stage(  # noqa: PLR0913 - what the response depends on
+def stage_response(  # noqa: PLR0913 - what the response depends on
     plant: Actuator,
     amplitude: float,
     frequency: float,
@@ -108,7 +108,7 @@ def gear_stage(  # noqa: PLR0913 - what the response depends on
         Where the actuator has a controller.
     """
     if plant.controller is not None:
-        raise ValueError(f"gear_stage: {plant.name} has a controller; give the gear with a TorqueSource and none")
+        raise ValueError(f"stage_response: {plant.name} has a controller; give the gear with a TorqueSource and none")
     period = 1 / frequency
     torque = Sum(parts=(Constant(value=offset), Sine(amplitude=amplitude, frequency=frequency)))
     run = simulate(
@@ -155,7 +155,7 @@ class PredictedCycle:
         return self.distortion < TRUSTED
 
 
-def predicted_cycles(
+def predict_cycles(
     loop: control.StateSpace,
     describing: Describing,
     amplitudes: Sequence[float] | np.ndarray,

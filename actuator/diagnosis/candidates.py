@@ -1,7 +1,7 @@
 """Remedies against hunting that suit a controller, with their settings and what is predicted of them.
 
-Settings follow from the cycle and from what stiction holds (`rest_set`): with A the amplitude and H half of the range
-of motor torques that stiction holds,
+Settings follow from the cycle and from the equilibrium set: with A the amplitude and H half of the range of motor
+torques that stiction holds,
 
     dead band          BAND * A                    rests wherever it stops inside
     leakage            total gain at rest SHARE * H/A, so that no error of size A breaks away
@@ -21,7 +21,7 @@ from actuator.diagnosis.cycle_energy import changed_parameters
 from actuator.parts.sensors import Sensors
 from actuator.simulation.run import FREE, STUCK, Run
 from actuator.stiction.breakaway import NotAtRest
-from actuator.stiction.equilibrium_set import RestSet, rest_set
+from actuator.stiction.equilibrium_set import EquilibriumSet, find_equilibrium_set
 from actuator.verdict.verdict import classify
 from controllers.cascade import Cascade
 from controllers.compensation import Dither, FrictionCompensation, Knocker
@@ -54,7 +54,7 @@ class _Cycle(NamedTuple):
     """What the settings rest on."""
 
     amplitude: float  # rad at the load
-    held: RestSet  # N m at the motor
+    held: EquilibriumSet  # N m at the motor
     half: float  # N m
     gain: float  # N m at the motor per rad of position error, without integral action
     integral: float  # the same per second
@@ -108,17 +108,19 @@ def _values(run: Run) -> dict[str, float]:
     return {q.name: float(value) for q, value in zip(run.system.parameters, run.parameters, strict=True)}
 
 
-def _held(plant: Actuator, run: Run) -> RestSet:
+def _held(plant: Actuator, run: Run) -> EquilibriumSet:
     """Motor torques that stiction holds in the last standstill of the run; what the motor went through without one."""
     rows = np.array([np.isin(values, (STUCK, FREE)) for values in run.modes.values()])
     standing = np.flatnonzero(rows.all(axis=0))
     for k in standing[-1:]:
         try:
-            return rest_set(replace(plant, sensors=Sensors()), run.state(int(k)), parameters=changed_parameters(run))
+            return find_equilibrium_set(
+                replace(plant, sensors=Sensors()), run.state(int(k)), parameters=changed_parameters(run)
+            )
         except NotAtRest:
             break
     late = run["motor_torque"][run.t >= run.t[-1] / 2]
-    return RestSet(lower=float(late.min()), upper=float(late.max()))
+    return EquilibriumSet(lower=float(late.min()), upper=float(late.max()))
 
 
 def _with_integrating(plant: Actuator, **changes: Any) -> Actuator:

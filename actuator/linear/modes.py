@@ -14,7 +14,7 @@ from actuator.linear.model import linearize, loop_transfer
 from actuator.linear.operating_point import MOTIONS, NoEquilibrium, OperatingPoint
 from actuator.linear.sampled import without_counts
 from actuator.linear.trim import trim
-from actuator.simulation.run import FREE, STUCK, contact_labels, contact_names
+from actuator.simulation.run import FREE, STUCK, contact_labels
 from actuator.system.hybrid import HybridSystem
 from gear.quantities import require_known
 
@@ -43,7 +43,7 @@ class ModeModel:
     @property
     def contacts(self) -> dict[str, str]:
         """Mode of each contact, in words."""
-        return contact_labels(self.point.system.modes, self.point.m)
+        return contact_labels(self.point.system, self.point.m)
 
     @property
     def drifting(self) -> list[str]:
@@ -148,7 +148,7 @@ def mode_models(
         else:
             found.append(ModeModel(name=name, point=point, equilibrium=True))
 
-    contacts = contact_names(system.modes)
+    contacts = [contact.name for contact in system.contacts]
     for word in MOTIONS if contacts else ["forward"]:
         attempt(word, word, guess)
     if not found:

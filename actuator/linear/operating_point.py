@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuator.simulation.run import contact_names
 from actuator.system.hybrid import HybridSystem
 from gear.quantities import require_known
 
@@ -70,7 +69,7 @@ def modes_of(
     moves "forward" or "backward" (some of them backward, then). Words per contact are about its own slip
     speed. Flanks that are not given are +1, those of end stops 0; a contact on no flank is free, whatever its word.
     """
-    names = contact_names(system.modes)
+    names = [contact.name for contact in system.contacts]
     if isinstance(contacts, str):
         require_known([contacts], MOTIONS, "contact mode")
         values = {f"{name}.motion": MOTIONS[contacts] * system.travel[name] for name in names}

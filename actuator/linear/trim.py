@@ -121,7 +121,7 @@ def _held_by_others(balance: Balance, x: np.ndarray, rates: np.ndarray) -> tuple
     system, m, u, p = balance.system, balance.m, balance.u, balance.p
     _, modes, fault = system.reset(np.zeros(len(system.margin_names)), x, m, u, p)
     after = np.round(modes.full().ravel())
-    same = contact_labels(system.modes, m) == contact_labels(system.modes, after) and all(
+    same = contact_labels(system, m) == contact_labels(system, after) and all(
         before == now for name, before, now in zip(system.modes, m, after, strict=True) if name.endswith(".flank")
     )
     taken = Balance(system, x, after, u, p, balance.free)

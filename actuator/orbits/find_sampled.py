@@ -11,7 +11,7 @@ from actuator.orbits.flow import NoOrbit
 from actuator.orbits.run_end import cycle_at_end
 from actuator.orbits.sampled import SampledOrbit, continued
 from actuator.orbits.tick_map import TickMap, tick_map
-from actuator.simulation.run import STUCK, Run
+from actuator.simulation.run import Run, find_standstill
 from actuator.system.hybrid import HybridSystem
 
 NEWTON_STEPS = 8
@@ -105,9 +105,7 @@ def resting_point(run: Run, period: float) -> tuple[np.ndarray, np.ndarray]:
     after it: what is held is still that of the point before.
     """
     inside = run.t >= run.t[-1] - period
-    resting = inside.copy()
-    for modes in run.modes.values():
-        resting &= modes == STUCK
+    resting = inside & find_standstill(run.modes)
     spans = np.flatnonzero(np.diff(np.concatenate([[False], resting, [False]]))).reshape(-1, 2)
     if len(spans):
         first, last = spans[np.argmax(spans[:, 1] - spans[:, 0])]

@@ -15,7 +15,6 @@ import numpy as np
 
 from actuator.orbits.switching_surfaces import hold_corners
 from actuator.simulation.compiled import compiled_where_wanted
-from actuator.simulation.run import contact_names
 from actuator.system.hybrid import MARGIN_BAND, HybridSystem
 
 TOLERANCE = 1e-10  # local error of each state over its nominal size
@@ -54,7 +53,7 @@ class FlowMap:
         self.system, self.tolerance, self.compiled = system, tolerance, compiled
         self.nominal = np.array([state.nominal for state in system.states])
         self.nx, self.grid = len(system.states), GRID
-        contacts = contact_names(system.modes)
+        contacts = [contact.name for contact in system.contacts]
         x, m, u, p = (ca.SX.sym(name, system.flow.size1_in(k)) for k, name in enumerate("xmup"))
         both = [system.flow(x, m, u, p), system.margins(x, m, u, p) - MARGIN_BAND]
         smooth = hold_corners(ca.Function("both", [x, m, u, p], both, {"cse": True}))

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 from actuator.orbits.flow import FlowMap
 from actuator.orbits.segments import Segment
-from actuator.simulation.run import FREE, STUCK, contact_labels
+from actuator.simulation.run import contact_labels, find_standstill, label_rows
 from actuator.system.hybrid import HybridSystem
 
 if TYPE_CHECKING:
@@ -98,22 +98,17 @@ class Orbit:
         following = [*self.segments[1:], self.segments[0]]
         for segment, after in zip(self.segments, following, strict=True):
             time += segment.duration
-            labels = (contact_labels(self.system.modes, part.modes) for part in (segment, after))
+            labels = (contact_labels(self.system, part.modes) for part in (segment, after))
             old, new = labels
             found += [OrbitEvent(time, name, old[name], new[name]) for name in old if old[name] != new[name]]
         return tuple(found)
 
     @cached_property
     def stick_fraction(self) -> float:
-        """Part of the period in which every contact that sticks at all is stuck."""
-        labels = [contact_labels(self.system.modes, segment.modes) for segment in self.segments]
-        sticky = {name for row in labels for name, label in row.items() if label == STUCK}
-        held = sum(
-            segment.duration
-            for segment, row in zip(self.segments, labels, strict=True)
-            if sticky and all(row[name] in (STUCK, FREE) for name in sticky)
-        )
-        return float(held / self.period)
+        """Part of the period in which everything is at rest."""
+        segments = self.segments
+        resting = find_standstill(label_rows(self.system, np.array([segment.modes for segment in segments]).T))
+        return float(np.array([segment.duration for segment in segments])[resting].sum() / self.period)
 
     @cached_property
     def load_amplitude(self) -> float:

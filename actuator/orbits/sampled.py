@@ -25,7 +25,6 @@ from actuator.orbits.tick_map import TOLERANCE
 from actuator.simulation.run import ModeChange, Run
 from actuator.simulation.simulate import simulate
 from actuator.system.hybrid import HybridSystem
-from actuator.verdict.motion_record import stuck_fraction
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -89,7 +88,7 @@ class SampledOrbit:
     @property
     def stick_fraction(self) -> float:
         """Part of the period in which every contact is stuck."""
-        return stuck_fraction(self.run, 0.0, self.period)
+        return self.run.stuck_share(0.0, self.period)
 
     @property
     def load_amplitude(self) -> float:

@@ -24,7 +24,7 @@ def plot_orbit(orbit: Orbit, names: Sequence[str]) -> Figure:
     by_unit: dict[str, list[str]] = {}
     for name in names:
         by_unit.setdefault(units[name], []).append(name)
-    contacts = list(contact_labels(orbit.system.modes, orbit.modes))
+    contacts = list(contact_labels(orbit.system, orbit.modes))
     ratios = [1.6] * len(by_unit) + [RIBBON_HEIGHT * len(contacts) + 0.15]
     figure = Figure(figsize=(12, sum(ratios) + 1.2), layout="constrained")
     left, right = figure.subfigures(1, 2, width_ratios=(2.6, 1))  # pyright: ignore[reportGeneralTypeIssues]
@@ -47,7 +47,7 @@ def plot_orbit(orbit: Orbit, names: Sequence[str]) -> Figure:
 def _ribbon(axes: Axes, orbit: Orbit, contacts: Sequence[str]) -> None:
     """One bar per contact, colored by its mode."""
     ends = np.cumsum([segment.duration for segment in orbit.segments])
-    labels = [contact_labels(orbit.system.modes, segment.modes) for segment in orbit.segments]
+    labels = [contact_labels(orbit.system, segment.modes) for segment in orbit.segments]
     for row, contact in enumerate(contacts):
         for end, segment, names in zip(ends, orbit.segments, labels, strict=True):
             span = [(end - segment.duration, segment.duration)]

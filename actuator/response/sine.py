@@ -14,6 +14,7 @@ from actuator.response.fourier import fourier
 from actuator.simulation.engine import Engine, engine
 from actuator.simulation.failures import SimulationError
 from actuator.simulation.prepared import EngineOptions
+from actuator.simulation.run import BACKWARD, FORWARD, find_standstill, label_rows
 from actuator.simulation.signals import Constant, Signal, Sine, piece_at
 from actuator.simulation.window_points import join
 from actuator.stiction.standstill import find_rest, middle, slowest_constant, soaked
@@ -160,10 +161,6 @@ class SineStream:
         return [names.index(name) for name in self.seen]
 
     @cached_property
-    def _motions(self) -> list[int]:
-        return [k for k, name in enumerate(self.system.modes) if name.endswith(".motion")]
-
-    @cached_property
     def _starts(self) -> dict[tuple, tuple[np.ndarray, np.ndarray, float]]:
         return {}
 
@@ -257,7 +254,7 @@ class SineStream:
         ValueError
             Where something slides at the lowest amplitude already, or nothing at the highest; without any contact.
         """
-        if not self._motions:
+        if not self.system.contacts:
             raise ValueError(f"{self.system.name}: has no contact that could stick, so no threshold")
         if not 0 < lowest < highest:
             raise ValueError(f"threshold needs 0 < lowest < highest, got {lowest:g} and {highest:g}")
@@ -323,13 +320,13 @@ class _Stream:
         self.x, self.m = windows[-1].end
         self.periods += periods
         values = window.outputs[stream._rows]
-        motions = np.round(window.modes[stream._motions])
-        slides = abs(motions) == 1
+        labels = label_rows(stream.system, np.round(window.modes))
+        slides = [np.isin(row, (FORWARD, BACKWARD)).any() for row in labels.values()]
         weights = np.gradient(window.time)
         return _Block(
             # the input is a cosine: its phase is that of time
             amplitudes=fourier(window.time, values, frequency, stream.harmonics),
             swing=np.ptp(values, axis=1),
-            slides=bool(slides.any()) or not len(motions),
-            stuck=float(weights[~slides.any(axis=0)].sum() / weights.sum()) if len(motions) else 0.0,
+            slides=any(slides) or not slides,
+            stuck=float(weights[find_standstill(labels)].sum() / weights.sum()) if labels else 0.0,
         )

@@ -1,6 +1,6 @@
 """A completed run: signals by name, the modes of every contact, and when they changed."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -39,18 +39,40 @@ class Statistics(NamedTuple):
     compiled: bool
 
 
-def contact_names(modes: Sequence[str]) -> list[str]:
-    """Contacts of a system, from the names of its mode variables."""
-    return [name.removesuffix(".motion") for name in modes if name.endswith(".motion")]
-
-
-def contact_labels(modes: Sequence[str], values: Sequence[float] | np.ndarray) -> dict[str, str]:
+def contact_labels(system: HybridSystem, values: Sequence[float] | np.ndarray) -> dict[str, str]:
     """Mode of each contact in words, from the mode variables."""
-    named = dict(zip(modes, values, strict=True))
+    named = dict(zip(system.modes, values, strict=True))
     return {
-        contact: FREE if named.get(f"{contact}.flank", 1) == 0 else LABELS[int(named[f"{contact}.motion"])]
-        for contact in contact_names(modes)
+        contact.name: FREE if contact.flank and named[contact.flank] == 0 else LABELS[int(named[contact.motion])]
+        for contact in system.contacts
     }
+
+
+def label_rows(system: HybridSystem, values: np.ndarray) -> dict[str, np.ndarray]:
+    """Modes of each contact in words, from rows of the mode variables."""
+    rows = dict(zip(system.modes, values, strict=True))
+    table = np.array([LABELS[k] for k in (-2, -1, 0, 1, 2)])
+    found = {}
+    for contact in system.contacts:
+        labels = table[rows[contact.motion].astype(int) + 2]
+        found[contact.name] = np.where(rows[contact.flank] == 0, FREE, labels) if contact.flank else labels
+    return found
+
+
+def is_at_rest(labels: Sequence[str] | np.ndarray) -> np.ndarray:
+    """Whether contacts in these modes are at rest, (K,) or (K, n): some stuck, all others in their gaps.
+
+    A mesh in its gap tells nothing of the shafts beside it; what sticks does.
+    """
+    labels = np.asarray(labels)
+    stuck = labels == STUCK
+    return stuck.any(axis=0) & (stuck | (labels == FREE)).all(axis=0)
+
+
+def find_standstill(modes: Mapping[str, np.ndarray]) -> np.ndarray:
+    """At which points of rows of modes everything is at rest; a contact that never sticks is not asked."""
+    rows = np.array(list(modes.values()))
+    return is_at_rest(rows[(rows == STUCK).any(axis=1)]) if rows.size else np.zeros(rows.shape[-1:], bool)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,10 +132,10 @@ class Run:
         signals |= {quantity.name: row for quantity, row in zip(system.states, window.states, strict=True)}
         signals |= {quantity.name: row for quantity, row in zip(system.outputs, window.outputs, strict=True)}
         named = [*system.inputs, *system.states, *system.outputs]
-        before = contact_labels(system.modes, window.modes[:, 0])
+        before = contact_labels(system, window.modes[:, 0])
         changes = []
         for time, values in window.events:
-            after = contact_labels(system.modes, values)
+            after = contact_labels(system, values)
             changes += [
                 ModeChange(time, name, before[name], mode) for name, mode in after.items() if mode != before[name]
             ]
@@ -123,7 +145,7 @@ class Run:
             t=window.time,
             signals=signals,
             units={quantity.name: quantity.unit for quantity in named},
-            modes=_label_rows(system.modes, window.modes),
+            modes=label_rows(system, window.modes),
             mode_values=window.modes,
             changes=tuple(changes),
             margins=window.margins,
@@ -134,6 +156,19 @@ class Run:
     def state(self, index: int = -1) -> dict[str, float]:
         """The states at an output point by name, to start another run from."""
         return {quantity.name: float(self[quantity.name][index]) for quantity in self.system.states}
+
+    def stuck_share(self, start: float, end: float) -> float:
+        """Part of the time from start to end [s] in which everything is at rest, from the times of the mode changes."""
+        first = {name: row[0] for name, row in self.modes.items()}
+        first |= {change.contact: change.before for change in reversed(self.changes)}
+        # a contact that never sticks does not tell whether the others do
+        first = {name: mode for name, mode in first.items() if (self.modes[name] == STUCK).any()}
+        rows = [first]
+        for change in self.changes:
+            rows.append(rows[-1] | {change.contact: change.after} if change.contact in first else rows[-1])
+        resting = is_at_rest(np.array([list(row.values()) for row in rows]).T) if first else np.zeros(len(rows), bool)
+        edges = np.clip([start, *(change.time for change in self.changes), end], start, end)
+        return float(np.diff(edges)[resting].sum() / (end - start))
 
     def plot(self, names: Sequence[str] = ("motor_angle", "load_angle", "motor_torque")) -> "Figure":
         """Signals above a ribbon of the contact modes."""
@@ -152,14 +187,3 @@ class Run:
             coords={"time": ("time", self.t, {"units": "s"})},
             attrs={"system": self.system.name, **self.statistics._asdict()},
         )
-
-
-def _label_rows(names: Sequence[str], values: np.ndarray) -> dict[str, np.ndarray]:
-    rows = dict(zip(names, values, strict=True))
-    table = np.array([LABELS[k] for k in (-2, -1, 0, 1, 2)])
-    found = {}
-    for contact in contact_names(names):
-        labels = table[rows[f"{contact}.motion"].astype(int) + 2]
-        flank = rows.get(f"{contact}.flank")
-        found[contact] = labels if flank is None else np.where(flank == 0, FREE, labels)
-    return found

@@ -1,4 +1,4 @@
-"""How stiction holds a standstill, and for how long: until the integrator has driven the motor torque to its edge."""
+"""How stiction holds a standstill, and when it breaks away: once the integrator has driven the motor that far."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,12 +11,13 @@ from actuator.orbits.cut_motion import cut_motion
 from actuator.orbits.flow import FlowMap, NoOrbit, flow_map
 from actuator.simulation.engine import engine
 from actuator.simulation.prepared import EngineOptions
-from actuator.simulation.run import STUCK, contact_labels, contact_names
+from actuator.simulation.run import STUCK, contact_labels, is_at_rest
 from actuator.simulation.signals import Piece
-from actuator.system.hybrid import HybridSystem
+from actuator.system.hybrid import EventKind, HybridSystem
+from gear.quantities.roles import ShaftSpeed
 
-RATES = 1e-6  # rate of a state over its nominal size [1/s] that does not count as moving
-LONGEST = 1e4  # s, after which a standstill is called permanent
+STILL_RATE = 1e-6  # rate of a state over its nominal size [1/s] that does not count as moving
+PERMANENT = 1e4  # s, after which a standstill is called so
 
 
 class NotAtRest(ValueError):
@@ -24,26 +25,26 @@ class NotAtRest(ValueError):
 
 
 class Hold(NamedTuple):
-    """How far a contact is from letting go."""
+    """How far a contact is from breaking away."""
 
     margin: float  # smaller of static - s and static + s, over its usual force or torque
     reserve: float  # the same, over the friction limit: 1 unloaded, 0 at breakaway
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Rest:
-    """A standstill with all contacts stuck, and its end.
+class BreakawayPrediction:
+    """A standstill that stiction holds, and its end.
 
     Attributes
     ----------
     holds : dict of str to Hold
-        Per contact, at the start.
+        Per contact that sticks, at the start.
     position_error : float
         [rad]; nan without a reference.
     drift_time : float
-        Time until a contact lets go [s], under integral action; infinite where none does.
+        Time until a contact breaks away [s], under integral action; infinite where none does.
     breaks : str
-        The margin at which it lets go; empty where none does.
+        The event at which it does; empty where none does.
     """
 
     system: HybridSystem = field(repr=False)
@@ -53,15 +54,15 @@ class Rest:
     breaks: str
 
 
-def rest(
+def predict_breakaway(
     plant: Actuator | HybridSystem,
     state: Mapping[str, float],
     *,
     inputs: Mapping[str, float] | None = None,
     parameters: Mapping[str, float] | None = None,
     compiled: bool | None = None,
-) -> Rest:
-    """How stiction holds an actuator in a state, and when it lets go.
+) -> BreakawayPrediction:
+    """How stiction holds an actuator in a state, and when it breaks away.
 
     Parameters
     ----------
@@ -77,19 +78,20 @@ def rest(
     Raises
     ------
     NotAtRest
-        Where a contact slides in this state.
+        Where a contact slides in this state, or a shaft is held by none.
     """
     system = plant.system() if isinstance(plant, Actuator) else plant
     x, u, p = system.state_vector(state), system.input_vector(inputs), system.parameter_values(parameters)
     x, m = engine(system, EngineOptions(compiled=compiled)).settle(0.0, x, np.zeros(len(system.modes)), u, p)
-    labels = contact_labels(system.modes, m)
-    moving = [name for name, label in labels.items() if label != STUCK]
-    if moving:
-        text = ", ".join(f"{name} is {labels[name]}" for name in moving)
-        raise NotAtRest(f"{system.name}: stiction does not hold this state: {text}")
+    labels = contact_labels(system, m)
+    moving = [] if is_at_rest(list(labels.values())) else [f"{name} is {label}" for name, label in labels.items()]
+    if not moving:  # what no contact holds may hang in a gap
+        moving = find_unsupported(system, x, m, u, p)
+    if moving or not labels:
+        raise NotAtRest(f"{system.name}: stiction does not hold this state: {', '.join(moving) or 'nothing sticks'}")
     machine = flow_map(system, compiled=compiled)
     time, name = _drift(machine, x, machine.words(m), u, p)
-    return Rest(
+    return BreakawayPrediction(
         system=system,
         holds=_holds(system, x, m, u, p),
         position_error=_error(system, x, m, u, p),
@@ -98,11 +100,22 @@ def rest(
     )
 
 
+def find_unsupported(system: HybridSystem, x: np.ndarray, m: np.ndarray, u: np.ndarray, p: np.ndarray) -> list[str]:
+    """Shafts that move or accelerate in a state."""
+    rates = system.flow(x, m, u, p).full().ravel()
+    return [
+        f"{state.owner} moves"
+        for state, speed, rate in zip(system.states, x, rates, strict=True)
+        if state.role(ShaftSpeed) is not None and max(abs(speed), abs(rate)) > STILL_RATE * state.nominal
+    ]
+
+
 def _holds(system: HybridSystem, x: np.ndarray, m: np.ndarray, u: np.ndarray, p: np.ndarray) -> dict[str, Hold]:
-    margins = dict(zip(system.margin_names, system.margins(x, m, u, p).full().ravel(), strict=True))
+    margins = zip(system.events, system.margins(x, m, u, p).full().ravel(), strict=True)
+    sides = {(event.at, event.side): margin for event, margin in margins if event.kind is EventKind.FRICTION}
     found = {}
-    for name in contact_names(system.modes):
-        upper, lower = margins[f"{name} upper"], margins[f"{name} lower"]
+    for name in (name for name, label in contact_labels(system, m).items() if label == STUCK):
+        upper, lower = sides[name, 1], sides[name, -1]
         # (static - s) and (static + s) over the same size: their mean is the limit
         found[name] = Hold(float(min(upper, lower)), float(2 * min(upper, lower) / (upper + lower)))
     return found
@@ -116,17 +129,16 @@ def _error(system: HybridSystem, x: np.ndarray, m: np.ndarray, u: np.ndarray, p:
 
 
 def _drift(machine: FlowMap, x: np.ndarray, m: tuple[int, ...], u: np.ndarray, p: np.ndarray) -> tuple[float, str]:
-    """Time to the first contact that lets go, and its margin; infinite, "" where the controller comes to rest first."""
+    """Time to breakaway and its event; infinite, "" where the controller comes to rest first."""
     length, passed = 1.0, 0.0
-    while passed < LONGEST:
-        if (abs(machine.rate(x, m, u, p)) < RATES * machine.nominal).all():
+    while passed < PERMANENT:
+        if (abs(machine.rate(x, m, u, p)) < STILL_RATE * machine.nominal).all():
             return float("inf"), ""
         window = engine(machine.system, EngineOptions(tolerance=1e-9, compiled=machine.compiled)).run(
             0.0, length, x, np.array(m, float), p, [Piece(float(value)) for value in u]
         )
         for time, after in window.events:
-            labels = contact_labels(machine.system.modes, after)
-            if any(label != STUCK for label in labels.values()):
+            if not is_at_rest(list(contact_labels(machine.system, after).values())):
                 return _exactly(machine, x, m, u, p, float(time), passed)
         x, m, passed, length = window.end[0], machine.words(window.end[1]), passed + length, 2 * length
     return float("inf"), ""
@@ -135,10 +147,10 @@ def _drift(machine: FlowMap, x: np.ndarray, m: tuple[int, ...], u: np.ndarray, p
 def _exactly(
     machine: FlowMap, x: np.ndarray, m: tuple[int, ...], u: np.ndarray, p: np.ndarray, guess: float, passed: float
 ) -> tuple[float, str]:
-    """The release near `guess`, from the margins themselves."""
+    """The breakaway near `guess`, from the margins themselves."""
     pieces, _ = cut_motion(machine, x, m, u, p, guess * (1 + 1e-3) + 1e-6)
     for piece in pieces:
         passed += piece.duration
-        if piece.fired < machine.events and machine.names[piece.fired].endswith(("upper", "lower")):
+        if piece.fired < machine.events and machine.system.events[piece.fired].kind is EventKind.FRICTION:
             return passed, machine.names[piece.fired]
     raise NoOrbit(f"{machine.system.name}: the end of the standstill at {passed + guess:.9g} s was not found again")

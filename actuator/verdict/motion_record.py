@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuator.simulation.run import FREE, STUCK, Run
+from actuator.simulation.run import Run
 
 STILL = 1e-9  # rad; less motion than this is none
 SAME = 0.02  # relative difference up to which two swings or two periods of a run are the same
@@ -71,32 +71,11 @@ def record_motion(run: Run, since: float | None = None) -> MotionRecord:
         reference=part("reference"),
         current=part("current"),
         loss=np.sum(losses, axis=0) if losses else None,
-        stuck_share=lambda start, end: stuck_fraction(run, start, end),
+        stuck_share=run.stuck_share,
         resolution=_resolution(run),
         drift=drift,
         breakaway=breakaway,
     )
-
-
-def stuck_fraction(run: Run, start: float, end: float) -> float:
-    """Part of the time from start to end in which every contact is stuck, from the times of the mode changes."""
-    modes = {name: str(row[0]) for name, row in run.modes.items()}
-    modes |= {change.contact: change.before for change in reversed(run.changes)}
-    # a contact that never sticks (no friction, or in its gap) does not tell whether the others stand
-    modes = {name: mode for name, mode in modes.items() if (run.modes[name] == STUCK).any()}
-    if not modes:
-        return 0.0
-    stuck, at = 0.0, float(start)
-    for change in run.changes:
-        if change.time > end:
-            break
-        if change.time > at:
-            stuck += (change.time - at) * all(mode in (STUCK, FREE) for mode in modes.values())
-            at = change.time
-        if change.contact in modes:
-            modes[change.contact] = change.after
-    stuck += (end - at) * all(mode in (STUCK, FREE) for mode in modes.values())
-    return float(stuck / (end - start))
 
 
 def measure_swings(signal: np.ndarray, count: int) -> list[float]:

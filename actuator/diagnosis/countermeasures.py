@@ -13,7 +13,8 @@ from actuator.diagnosis.candidates import Candidate, candidates
 from actuator.simulation.many import run_many, submit_many
 from actuator.simulation.run import Run
 from actuator.simulation.signals import Signal
-from actuator.simulation.simulate import simulate
+from actuator.stiction.margins import find_onset
+from actuator.system.parameters import scaled_breakaway
 from actuator.verdict.motion_record import record_motion
 from actuator.verdict.verdict import REST, Hunting, classify, decide
 
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LADDER = (1.0, 1.4, 2.0, 2.8, 4.0)  # factors on breakaway friction that are tried
-BREAKAWAY = (".breakaway", ".static")
 CYCLES = 5.0  # periods of the cycle that a run with a remedy's own motion lasts
 NOTHING = 1e-6  # rad; an error that is none
 MOST_FORCED, SAME = 3.5, 0.02  # periods of a remedy's own motion after which a cycle may repeat, and how exactly
@@ -227,13 +227,15 @@ def _try_remedy(work: _Work) -> Remedy:
     )
 
 
-def _stiction_factor(plant: Actuator, parameters: Mapping[str, float], duration: float, options: dict) -> float:
-    """The last rung of the ladder at which it rests, by bisection; it does on the first."""
-    values = {q.name: float(q.default) for q in plant.system().parameters} | dict(parameters)
-    low, high = 0, len(LADDER)
-    while high - low > 1:
-        middle = (low + high) // 2
-        more = {name: LADDER[middle] * value for name, value in values.items() if name.endswith(BREAKAWAY)}
-        run = simulate(plant, duration, parameters={**parameters, **more}, **options)
-        low, high = (middle, high) if classify(run).verdict == REST else (low, middle)
-    return LADDER[low]
+def _stiction_factor(
+    plant: Actuator, parameters: Mapping[str, float], duration: float, options: Mapping[str, Any]
+) -> float:
+    """The largest factor of the ladder on all breakaway friction at which it rests; it does at the first."""
+    declared = plant.system().parameters
+    values = {q.name: float(q.default) for q in declared} | dict(parameters)
+
+    def hunts(factor: float) -> bool:
+        changed = {**parameters, **scaled_breakaway(declared, factor, values)}
+        return decide(plant, duration, longest=1.0, parameters=changed, **options).hunting.verdict != REST
+
+    return find_onset(hunts, LADDER, first=False, monotonic=True).rests or LADDER[0]

@@ -5,31 +5,88 @@ are started on the last cycle and from the given state, with factors from 1/16 t
 
     margin in dB = 20 log10(factor)
 
-It is positive for an actuator that rests: so much more friction, backlash or gain it takes to hunt. It is negative for
-one that hunts: by so much they have to come down. Like gain margins, each is with all else unchanged.
+It is positive for an actuator that comes to rest: so much more friction, backlash or gain it takes to hunt. It is
+negative for one that hunts: by so much they have to come down. Like gain margins, each is with all else unchanged.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from enum import StrEnum
+from typing import Any, NamedTuple
 
 from actuator.actuator import Actuator
 from actuator.simulation.run import Run
+from actuator.system.hybrid import HybridSystem
+from actuator.system.parameters import Parameter, motion_integrals
+from actuator.system.parameters import at_least_sliding as keep_above_sliding
 from actuator.verdict.verdict import REST, UNDECIDED, Hunting, decide
+from gear.quantities.roles import Breakaway, Gap
 
-STICTION, BACKLASH, INTEGRAL = "stiction", "backlash", "integral gain"
-ENDINGS = {
-    STICTION: (".breakaway", ".static"),
-    BACKLASH: (".gap",),
-    INTEGRAL: ("controller.integral", "controller.speed.integral"),
-}
-SLIDING = {".breakaway": (".coulomb",), ".static": (".sliding", ".coulomb")}  # what breakaway becomes once it slides
-LEAST, MOST = 1 / 16, 16.0  # factors that are tried: 24 dB
-RESOLVED = 0.02  # of the factor
-POINTS = 5000
+STEPS, MOST = 4, 16.0  # factors of two that are tried, up to the largest factor and down to its inverse: 24 dB
+TOLERANCE = 1.02  # ratio of the factors between which hunting begins
+POINTS = 5000  # output points of a run
 LONGEST = 16.0  # times the duration of a run: a small gain makes long periods
 CYCLES = 8  # periods of the last cycle that a run from it needs
+
+
+class MarginKind(StrEnum):
+    """What the factor of a margin is on."""
+
+    STICTION = "stiction"
+    BACKLASH = "backlash"
+    INTEGRAL = "integral gain"
+
+
+STICTION, BACKLASH, INTEGRAL = MarginKind
+SCALED = {STICTION: "breakaway friction", BACKLASH: "backlash", INTEGRAL: "integral gain"}
+
+
+class Onset(NamedTuple):
+    """The nearest factors found on both sides of where hunting begins; None where there is none on a side."""
+
+    rests: float | None
+    hunts: float | None
+
+
+def find_onset(
+    hunts: Callable[[float], bool],
+    factors: Sequence[float],
+    *,
+    tolerance: float = math.inf,
+    first: bool | None = None,
+    monotonic: bool = False,
+) -> Onset:
+    """Find between which factors hunting begins or ends: by the given factors, then by geometric bisection.
+
+    Parameters
+    ----------
+    hunts : callable
+        Whether the actuator hunts at a factor.
+    factors : sequence of float
+        Those to try in turn, upward or downward, until the answer is another than at the first.
+    tolerance : float
+        Ratio of the two factors down to which it is bisected between them.
+    first : bool or None
+        The answer at the first factor; None to ask for it.
+    monotonic : bool
+        Whether the answer changes once at most among the factors, so that not all need to be tried.
+    """
+    first = hunts(factors[0]) if first is None else first
+    near, far = 0, len(factors)
+    while far - near > 1:
+        k = (near + far) // 2 if monotonic else near + 1
+        if hunts(factors[k]) == first:
+            near = k
+        else:
+            far = k
+            if not monotonic:
+                break
+    same, other = factors[near], factors[far] if far < len(factors) else None
+    while other is not None and max(same, other) > tolerance * min(same, other):
+        middle = math.sqrt(same * other)
+        same, other = (middle, other) if hunts(middle) == first else (same, middle)
+    return Onset(rests=other, hunts=same) if first else Onset(rests=same, hunts=other)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,8 +95,8 @@ class HuntingMargin:
 
     Attributes
     ----------
-    kind : str
-        "stiction", "backlash" or "integral gain".
+    kind : MarginKind
+        What it is a margin of.
     parameters : tuple of str
         What the factor is on.
     factor : float
@@ -48,7 +105,7 @@ class HuntingMargin:
         Factor and verdict of every run.
     """
 
-    kind: str
+    kind: MarginKind
     parameters: tuple[str, ...]
     factor: float
     runs: tuple[tuple[float, str], ...] = field(repr=False)
@@ -57,6 +114,13 @@ class HuntingMargin:
     def db(self) -> float:
         """The factor in dB: positive, what is left before it hunts; negative, what is too much."""
         return 20 * math.log10(self.factor) if self.factor > 0 else -math.inf
+
+
+def find_scaled(system: HybridSystem, kind: str) -> tuple[Parameter, ...]:
+    """The parameters that the factor of a margin is on: all that have the role, whatever law they belong to."""
+    if kind == INTEGRAL:
+        return motion_integrals(system.parameters)
+    return system.parameters_having(Breakaway if kind == STICTION else Gap)
 
 
 def hunting_margin(  # noqa: PLR0913 - what is simulated
@@ -69,7 +133,7 @@ def hunting_margin(  # noqa: PLR0913 - what is simulated
     duration: float = 20.0,
     compiled: bool | None = None,
 ) -> HuntingMargin:
-    """Largest factor without hunting on all breakaway friction, all backlash, or the integral gain.
+    """Largest factor without hunting on all breakaway friction, all backlash, or the integral gains.
 
     A factor below one on breakaway friction ends at the sliding friction of each contact.
 
@@ -83,8 +147,8 @@ def hunting_margin(  # noqa: PLR0913 - what is simulated
         Constant inputs, initial states and other parameters by name.
     duration : float
         Of the first run [s]. Those begun on a cycle last as many of its periods as a verdict needs; those that do
-        not decide are gone on with, up to 16 times as long; what shows no cycle by then counts as not hunting, and
-        has the verdict "undecided" in `runs`; irregular motion counts as hunting.
+        not decide are continued, up to 16 times as long; what shows no cycle by then counts as not hunting, and
+        has the verdict "undecided" in `runs`. Irregular motion counts as hunting.
     compiled : bool or None
         As for `simulate`.
 
@@ -93,82 +157,66 @@ def hunting_margin(  # noqa: PLR0913 - what is simulated
     ValueError
         Unknown kind, or an actuator without such a parameter.
     """
-    if kind not in ENDINGS:
-        raise ValueError(f"hunting_margin: kind must be one of {', '.join(ENDINGS)}, got {kind!r}")
-    defaults = {q.name: float(q.default) for q in plant.system().parameters} | dict(parameters or {})
-    names = tuple(name for name, value in defaults.items() if name.endswith(ENDINGS[kind]) and value > 0)
-    if not names:
-        raise ValueError(f"{plant.name} has no {' or '.join(ENDINGS[kind])} for a {kind} margin")
+    if kind not in list(MarginKind):
+        raise ValueError(f"hunting_margin: kind must be one of {', '.join(MarginKind)}, got {kind!r}")
+    kind, system = MarginKind(kind), plant.system()
+    values = {q.name: float(q.default) for q in system.parameters} | dict(parameters or {})
+    scaled = tuple(parameter for parameter in find_scaled(system, kind) if values[parameter.name] > 0)
+    if not scaled:
+        raise ValueError(f"{plant.name} has no {SCALED[kind]}, so there is no {kind} margin")
     trials = _Trials(
-        plant,
-        kind,
-        {name: defaults[name] for name in names},
-        defaults,
-        dict(parameters or {}),
-        start,
-        duration,
-        {"inputs": dict(inputs or {}), "compiled": compiled},
+        plant=plant,
+        scaled=scaled,
+        values=values,
+        changed=dict(parameters or {}),
+        start=start,
+        duration=duration,
+        common={"inputs": dict(inputs or {}), "compiled": compiled},
     )
-    run, hunts = trials.at(1.0, start)
-    low, high, begin = 1.0, 1.0, run.state() if hunts else start
-    step = 0.5 if hunts else 2.0
-    while True:
-        factor = (low if hunts else high) * step
-        if not LEAST <= factor <= MOST:
-            return HuntingMargin(
-                kind=kind, parameters=names, factor=0.0 if hunts else math.inf, runs=tuple(trials.runs)
-            )
-        run, now = trials.at(factor, begin)
-        if hunts:
-            low, high = factor, low
-        else:
-            low, high = high, factor
-        if now:
-            begin = run.state()
-        if now != hunts:
-            break
-    trials.coarse = False
-    while high - low > RESOLVED * low:
-        middle = math.sqrt(low * high)
-        run, now = trials.at(middle, begin)
-        low, high = (low, middle) if now else (middle, high)
-        begin = run.state() if now else begin
-    return HuntingMargin(kind=kind, parameters=names, factor=math.sqrt(low * high), runs=tuple(trials.runs))
+    first = trials.hunts(1.0)
+    step = 0.5 if first else 2.0
+    found = find_onset(trials.hunts, [step**k for k in range(STEPS + 1)], tolerance=TOLERANCE, first=first)
+    factor = math.inf if found.hunts is None else 0.0 if found.rests is None else math.sqrt(found.rests * found.hunts)
+    names = tuple(parameter.name for parameter in scaled)
+    return HuntingMargin(kind=kind, parameters=names, factor=factor, runs=tuple(trials.runs))
 
 
+@dataclass(kw_only=True)
 class _Trials:
-    """Runs of one plant with a factor on some of its parameters."""
+    """Runs of one plant with a factor on some of its parameters, each from the last cycle on."""
 
-    def __init__(  # noqa: PLR0913, PLR0917 - what is simulated
-        self,
-        plant: Actuator,
-        kind: str,
-        values: Mapping[str, float],
-        defaults: Mapping[str, float],
-        others: Mapping[str, float],
-        start: Mapping[str, float] | None,
-        duration: float,
-        common: Mapping[str, Any],
-    ) -> None:
-        self.plant, self.kind, self.values, self.defaults, self.others = plant, kind, values, defaults, others
-        self.start, self.duration, self.common = start, duration, common
-        self.length, self.coarse = duration, True
+    plant: Actuator
+    scaled: Sequence[Parameter]
+    values: Mapping[str, float]
+    changed: Mapping[str, float]
+    start: Mapping[str, float] | None
+    duration: float
+    common: Mapping[str, Any]
+
+    def __post_init__(self) -> None:
+        self.begin, self.length = self.start, self.duration
         self.runs: list[tuple[float, str]] = []
 
-    def at(self, factor: float, begin: Mapping[str, float] | None) -> tuple[Run, bool]:
-        """The run, and whether it moves for ever."""
-        run, verdict = self._decided(factor, begin)
-        # a cycle can be lost in too long a step from the last one: in the coarse search both starts have to rest
-        if begin is not self.start and (verdict.verdict == UNDECIDED or (self.coarse and verdict.verdict == REST)):
-            other = self._decided(factor, self.start)
+    def hunts(self, factor: float) -> bool:
+        """Whether it moves for ever."""
+        tried = [factor for factor, _ in self.runs]
+        between = bool(tried) and min(tried) < factor < max(tried)
+        run, verdict = self._decide(factor, self.begin)
+        # a cycle can be lost in too long a step from the last one: beyond what was tried both starts have to rest
+        lost = verdict.verdict == UNDECIDED or (verdict.verdict == REST and not between)
+        if self.begin is not self.start and lost:
+            other = self._decide(factor, self.start)
             if verdict.verdict == UNDECIDED or other[1].verdict != UNDECIDED:
                 run, verdict = other
-        return run, verdict.verdict not in (REST, UNDECIDED)
+        hunts = verdict.verdict not in (REST, UNDECIDED)
+        if hunts:
+            self.begin = run.state()
+        return hunts
 
-    def _decided(self, factor: float, begin: Mapping[str, float] | None) -> tuple[Run, Hunting]:
-        """A run, gone on with where its verdict waits for a slow controller; what moves irregularly, moves."""
-        changed = {name: at_least_sliding(name, factor * value, self.defaults) for name, value in self.values.items()}
-        options = {**self.common, "parameters": {**self.others, **changed}}
+    def _decide(self, factor: float, begin: Mapping[str, float] | None) -> tuple[Run, Hunting]:
+        """A run, continued where its verdict waits for a slow controller; what moves irregularly, moves."""
+        numbers = {p.name: keep_above_sliding(p, factor * self.values[p.name], self.values) for p in self.scaled}
+        options = {**self.common, "parameters": {**self.changed, **numbers}}
         step = self.duration / POINTS
         run, verdict = decide(self.plant, self.length, longest=1.0, start=begin, resolution=step, **options)
         if verdict.verdict == UNDECIDED:
@@ -182,14 +230,14 @@ class _Trials:
         return run, verdict
 
 
-def hunting_margins(plant: Actuator, kinds: Sequence[str] = (STICTION, BACKLASH, INTEGRAL), **options) -> dict:
+def hunting_margins(plant: Actuator, kinds: Sequence[str] = tuple(MarginKind), **options) -> dict[str, HuntingMargin]:
     """All margins by kind that the actuator has parameters for; options as of `hunting_margin`."""
-    names = [quantity.name for quantity in plant.system().parameters]
-    return {kind: hunting_margin(plant, kind, **options) for kind in kinds if _has(names, kind)}
+    return {kind: hunting_margin(plant, kind, **options) for kind in kinds if find_scaled(plant.system(), kind)}
 
 
-def _has(names: Sequence[str], kind: str) -> bool:
-    return any(name.endswith(ENDINGS[kind]) for name in names)
+# -- for studies that still read these names ------------------------------------------------------------------
+
+SLIDING = {".breakaway": (".coulomb",), ".static": (".sliding", ".coulomb")}
 
 
 def sliding_of(name: str, values: Mapping[str, float]) -> str | None:

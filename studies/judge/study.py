@@ -33,7 +33,7 @@ from actuator.orbits.flow import flow_map
 from actuator.orbits.sampled import SampledOrbit
 from actuator.simulation.many import processes
 from actuator.simulation.signals import piece_at
-from actuator.stiction.margins import ENDINGS, HuntingMargin, hunting_margin
+from actuator.stiction.margins import HuntingMargin, MarginKind, find_scaled, hunting_margin
 from actuator.system.builder import PREFIX
 from actuator.verdict.verdict import DIVERGING
 from studies.cache import CONVERTER, Missing, Stages, actuator_of
@@ -224,8 +224,7 @@ class _Inside:
     def margins(self) -> dict[str, HuntingMargin]:
         """Those that the actuator has parameters for."""
         found = {}
-        names = [parameter.name for parameter in self.case.actuator.system().parameters]
-        for kind in [kind for kind, endings in ENDINGS.items() if any(name.endswith(endings) for name in names)]:
+        for kind in [kind for kind in MarginKind if find_scaled(self.case.actuator.system(), kind)]:
             try:
                 found[kind] = self.stages.get(
                     f"{kind} margin",

@@ -1,13 +1,13 @@
 """One actuator: its parts, their composition, and every question that can be asked of it."""
 
 from actuator.actuator import Actuator as Actuator
+from actuator.continuation.bifurcations import Branch as Branch
 from actuator.continuation.bisection import Bisection as Bisection
 from actuator.continuation.bisection import bisect_by_simulation as bisect_by_simulation
 from actuator.continuation.boundary import Boundary as Boundary
-from actuator.continuation.boundary import Stretch as Stretch
+from actuator.continuation.boundary import Interval as Interval
 from actuator.continuation.boundary import hunting_boundary as hunting_boundary
-from actuator.continuation.branch import Branch as Branch
-from actuator.continuation.continuation import follow as follow
+from actuator.continuation.continuation import continue_orbit as continue_orbit
 from actuator.describing.check import DescribingCheck as DescribingCheck
 from actuator.describing.check import check_describing_function as check_describing_function
 from actuator.describing.describing import PredictedCycle as PredictedCycle
@@ -18,6 +18,7 @@ from actuator.diagnosis.causes import find_causes as find_causes
 from actuator.diagnosis.countermeasures import find_remedies as find_remedies
 from actuator.diagnosis.cycle_energy import energy_per_cycle as energy_per_cycle
 from actuator.linear.bode import envelope as envelope
+from actuator.linear.loop import loop_transfer as loop_transfer
 from actuator.linear.margins.crossings import Margins as Margins
 from actuator.linear.margins.crossings import margins as margins
 from actuator.linear.margins.disk import DiskMargin as DiskMargin
@@ -28,7 +29,6 @@ from actuator.linear.margins.sensitivity import complementary_sensitivity as com
 from actuator.linear.margins.sensitivity import load_response as load_response
 from actuator.linear.margins.sensitivity import sensitivity as sensitivity
 from actuator.linear.model import linearize as linearize
-from actuator.linear.model import loop_transfer as loop_transfer
 from actuator.linear.modes import ModeModel as ModeModel
 from actuator.linear.modes import ModeModels as ModeModels
 from actuator.linear.modes import mode_models as mode_models
@@ -36,13 +36,15 @@ from actuator.linear.operating_point import NoEquilibrium as NoEquilibrium
 from actuator.linear.operating_point import OperatingPoint as OperatingPoint
 from actuator.linear.poles import Poles as Poles
 from actuator.linear.poles import poles as poles
-from actuator.linear.reduced import reduced as reduced
+from actuator.linear.reduce_order import reduced as reduced
 from actuator.linear.sampled import harmonic_response as harmonic_response
 from actuator.linear.sampled import without_counts as without_counts
 from actuator.linear.trim import trim as trim
 from actuator.orbits.find import find_orbit as find_orbit
 from actuator.orbits.flow import NoOrbit as NoOrbit
 from actuator.orbits.orbit import Orbit as Orbit
+from actuator.orbits.sampled import PeriodicOrbit as PeriodicOrbit
+from actuator.orbits.sampled import SampledOrbit as SampledOrbit
 from actuator.parts.bridge import Bridge as Bridge
 from actuator.parts.current_source import CurrentSource as CurrentSource
 from actuator.parts.dc_link import BrakingChopper as BrakingChopper
@@ -134,7 +136,9 @@ FORMER: dict[str, str] = {  # until 0.3
     "DescribedHunting": "DescribingCheck",
     "Rest": "BreakawayPrediction",
     "RestSet": "EquilibriumSet",
+    "Stretch": "Interval",
     "described_hunting": "check_describing_function",
+    "follow": "continue_orbit",
     "gear_stage": "stage_response",
     "predicted_cycles": "predict_cycles",
     "rest": "predict_breakaway",

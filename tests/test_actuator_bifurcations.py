@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from actuator import HybridSystem, find_orbit, follow, simulate
+from actuator import HybridSystem, continue_orbit, find_orbit, simulate
 from actuator.system.hybrid import MARGIN_BAND, Contact, Event, Mode, Place, Quantity
 from actuator.system.parameters import Parameter
 
@@ -69,7 +69,7 @@ def test_multipliers_are_those_of_the_closed_form():
 
 
 def test_a_family_turns_back_at_its_fold():
-    branch = follow(orbit(), "mu", (-0.4, 1.0), upward=False)
+    branch = continue_orbit(orbit(), "mu", (-0.4, 1.0), upward=False)
     assert branch.end.kind == "fold"
     assert branch.end.value == pytest.approx(-0.25, abs=2e-3)
     for value, found in zip(branch.values, branch.orbits, strict=True):
@@ -77,7 +77,7 @@ def test_a_family_turns_back_at_its_fold():
 
 
 def test_a_multiplier_that_passes_minus_one_doubles_the_period():
-    branch = follow(orbit(), "sigma", (-0.5, 0.5), upward=True)
+    branch = continue_orbit(orbit(), "sigma", (-0.5, 0.5), upward=True)
     assert branch.end.kind == "period doubling"
     assert branch.end.value == pytest.approx(0.0, abs=2e-2)
     assert branch.stable[:-1].all()

@@ -14,8 +14,8 @@ from actuator import (
     NoOrbit,
     TorqueSource,
     bisect_by_simulation,
+    continue_orbit,
     find_orbit,
-    follow,
     hunting_boundary,
     hunting_margin,
 )
@@ -31,7 +31,7 @@ def orbit_of(mass):
 
 
 def test_the_cycle_shrinks_to_nothing_where_breakaway_is_sliding_friction():
-    branch = follow(orbit_of(MassOnGuide()), BREAKAWAY, (0.5, 3.0), upward=False)
+    branch = continue_orbit(orbit_of(MassOnGuide()), BREAKAWAY, (0.5, 3.0), upward=False)
     assert branch.end.kind == "amplitude zero"
     assert branch.end.value == pytest.approx(1.0, abs=1e-6)
     assert branch.stable.all()
@@ -41,7 +41,7 @@ def test_the_cycle_shrinks_to_nothing_where_breakaway_is_sliding_friction():
 
 
 def test_every_orbit_of_a_family_is_one_of_the_closed_form():
-    branch = follow(orbit_of(MassOnGuide()), "controller.proportional", (2.9, 3.3), upward=True)
+    branch = continue_orbit(orbit_of(MassOnGuide()), "controller.proportional", (2.9, 3.3), upward=True)
     assert branch.end.kind == "bound"
     for value, orbit in list(zip(branch.values, branch.orbits, strict=True))[::2]:
         expected = MassOnGuide(kp=value).cycle()
@@ -52,7 +52,7 @@ def test_every_orbit_of_a_family_is_one_of_the_closed_form():
 def test_a_dead_band_ends_the_cycle_where_the_mass_stops_on_its_edge():
     # let go at one edge of the dead band, with z = 1.5 - 3 dead, it creeps to 3 e + z = 1: to the other edge
     edge = (1.5 - 1.0) / (2 * 3.0)
-    branch = follow(orbit_of(MassOnGuide(dead=0.04)), DEAD, (0.0, 0.3), upward=True)
+    branch = continue_orbit(orbit_of(MassOnGuide(dead=0.04)), DEAD, (0.0, 0.3), upward=True)
     assert branch.end.kind == "period infinite"
     assert branch.end.value == pytest.approx(edge, rel=1e-4)
 
@@ -116,12 +116,12 @@ def test_hunting_that_goes_on_to_the_other_bound_has_no_boundary_there():
 
 def test_bounds_must_hold_the_orbit():
     with pytest.raises(ValueError, match=r"breakaway = 1.5 must lie between its bounds 2, 3"):
-        follow(orbit_of(MassOnGuide()), BREAKAWAY, (2.0, 3.0), upward=True)
+        continue_orbit(orbit_of(MassOnGuide()), BREAKAWAY, (2.0, 3.0), upward=True)
 
 
 def test_an_unknown_parameter_is_named():
     with pytest.raises(KeyError, match="no parameter named 'controller.integrl'; did you mean controller.integral"):
-        follow(orbit_of(MassOnGuide()), "controller.integrl", (0.0, 3.0), upward=True)
+        continue_orbit(orbit_of(MassOnGuide()), "controller.integrl", (0.0, 3.0), upward=True)
 
 
 def test_the_stiction_margin_of_the_mass_ends_at_its_sliding_friction():

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from mass_on_guide import MassOnGuide
 
-from actuator import NoOrbit, find_orbit, follow, simulate
+from actuator import NoOrbit, continue_orbit, find_orbit, simulate
 from actuator.orbits.flow import flow_map
 from actuator.orbits.sampled import SampledOrbit
 from actuator.orbits.segments import passage
@@ -157,5 +157,8 @@ def test_a_sampled_system_has_a_sampled_orbit():
     assert orbit.period == pytest.approx(23.369, rel=0.05)
     with pytest.raises(ValueError, match="segments must be 1 for mass on a guide, which is sampled, got 2"):
         find_orbit(plant, run, segments=2, compiled=False)
-    with pytest.raises(ValueError, match="mass on a guide is sampled; its families are those of follow_sampled"):
-        follow(orbit, "controller.integral", (3.0, 5.0), upward=True)
+    with pytest.raises(ValueError, match="continue_orbit: controller.integral = .* must lie between its bounds 5, 6"):
+        continue_orbit(orbit, "controller.integral", (5.0, 6.0), upward=True)
+    signals = orbit.signals(["load_angle"])
+    assert orbit.times[-1] == pytest.approx(orbit.period)
+    assert np.ptp(signals["load_angle"]) / 2 == orbit.load_amplitude

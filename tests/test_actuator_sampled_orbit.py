@@ -10,8 +10,8 @@ import pytest
 
 from actuator import Actuator, TorqueSource, classify, simulate
 from actuator.continuation.bisection import bisect_by_simulation
-from actuator.continuation.sampled import follow_sampled
-from actuator.orbits.find_sampled import find_sampled_orbit
+from actuator.continuation.continuation import continue_orbit
+from actuator.orbits.find import find_orbit
 from actuator.orbits.flow import NoOrbit
 from controllers import PID, Sampling
 from gear import Bearing, Shaft, Transmission
@@ -77,7 +77,7 @@ def reduced(orbit):
 @pytest.mark.parametrize(("period", "delay"), [(5e-2, 0), (5e-2, 1)])
 def test_an_orbit_is_one_of_the_mass_in_closed_form(period, delay):
     plant = mass(period, delay)
-    orbit = find_sampled_orbit(plant, cycle(plant), compiled=False)
+    orbit = find_orbit(plant, cycle(plant), compiled=False)
     x = reduced(orbit)
     assert orbit.residual < 1e-8
     np.testing.assert_allclose(after(x, period, delay, orbit.ticks), x, atol=1e-9)
@@ -97,7 +97,7 @@ def test_an_orbit_is_one_of_the_mass_in_closed_form(period, delay):
 def test_the_cycle_persists_and_jitters_against_the_clock():
     plant = mass(5e-2)
     run = cycle(plant, 400.0)
-    orbit = find_sampled_orbit(plant, run, compiled=False)
+    orbit = find_orbit(plant, run, compiled=False)
     assert orbit.stable
     assert orbit.jitters
     slips = np.array([change.time for change in run.changes if change.before == "stuck"])
@@ -116,7 +116,7 @@ def test_fast_sampling_leads_to_the_continuous_cycle():
     errors = []
     for period in (5e-2, 2e-2):
         plant = mass(period)
-        orbit = find_sampled_orbit(plant, cycle(plant), compiled=False)
+        orbit = find_orbit(plant, cycle(plant), compiled=False)
         found = orbit.period, orbit.load_amplitude, orbit.stick_fraction
         errors.append(max(abs(a / b - 1) for a, b in zip(found, CONTINUOUS, strict=True)))
     assert errors[1] < 0.02
@@ -127,7 +127,8 @@ def test_a_family_ends_where_simulations_stop_hunting():
     # the cycle ends where it no longer sticks; stuck for one tick or two, no whole number of ticks closes any more
     plant = mass(5e-2)
     name, bounds = "controller.integral", (15.0, 18.0)
-    branch = follow_sampled(plant, cycle(plant, 200.0, **{name: 15.0}), name, bounds, compiled=False)
+    orbit = find_orbit(plant, cycle(plant, 200.0, **{name: 15.0}), compiled=False)
+    branch = continue_orbit(orbit, name, bounds, upward=True, compiled=False)
     options = {"inputs": {"reference": 0.0}, "start": {"mass.angle": 0.1}, "duration": 300.0, "compiled": False}
     bisection = bisect_by_simulation(plant, name, bounds, **options)
     assert branch.end.value == pytest.approx(bisection.value, rel=0.02)
@@ -139,4 +140,4 @@ def test_a_run_that_rests_has_no_orbit():
     run = cycle(plant, 60.0, **{"gear.bearings.guide.breakaway": 1.0})
     assert not classify(run).cycles
     with pytest.raises(NoOrbit, match="does not end in a cycle but in"):
-        find_sampled_orbit(plant, run)
+        find_orbit(plant, run)

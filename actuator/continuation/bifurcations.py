@@ -1,4 +1,4 @@
-"""How a family of orbits ends: what the last step along it has come across, and what is about to disappear.
+"""Families of periodic orbits over one parameter, and the bifurcation or bound at which one ends.
 
 A family turns back at a fold, or at a corner where its sequence of modes changes; multipliers leave the unit circle;
 the period grows or the amplitude shrinks without end; or no step leads on, and the last orbit tells why.
@@ -6,31 +6,73 @@ the period grows or the amplitude shrinks without end; or no step leads on, and 
 
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from actuator.continuation.branch import (
-    BOUND,
-    COLLISION,
-    ENDLESS,
-    FOLD,
-    GRAZING,
-    LOSS_OF_STICK,
-    LOST,
-    PERIOD_DOUBLING,
-    TORUS,
-    VANISHES,
-    End,
-)
 from actuator.orbits.flow import along
 from actuator.orbits.orbit import Orbit
+from actuator.orbits.sampled import SampledOrbit
 from actuator.simulation.run import STUCK, contact_labels
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FOLD, BOUND = "fold", "bound"
+PERIOD_DOUBLING, TORUS = "period doubling", "Neimark-Sacker"
+LOSS_OF_STICK, COLLISION, GRAZING, VANISHES, ENDLESS, LOST = (
+    "loss of stick",
+    "border collision",
+    "grazing",
+    "amplitude zero",
+    "period infinite",
+    "lost",
+)
 LONG, SMALL = 50.0, 0.02  # times the first period, part of the first amplitude
 BRIEF, TOUCHES = 0.02, 0.02  # part of the period, and of the usual size of a margin: what is about to disappear
 SHORTENS = 1e-4  # part of a standstill by which it gets shorter at least, from orbit to orbit
+
+
+class End(NamedTuple):
+    """Where a family of orbits ends."""
+
+    kind: str  # "fold", "period doubling", "Neimark-Sacker", "loss of stick", "border collision", ...
+    value: float  # of the parameter
+    reason: str  # in a sentence, with numbers
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Branch:
+    """A family of orbits over one parameter.
+
+    Attributes
+    ----------
+    parameter : str
+        Its name.
+    values : ndarray, (n,)
+        Of the parameter.
+    orbits : tuple of Orbit, or of SampledOrbit
+        In the order of the family.
+    end : End
+        Where and how it ends.
+    """
+
+    parameter: str
+    values: np.ndarray
+    orbits: tuple[Orbit, ...] | tuple[SampledOrbit, ...] = field(repr=False)
+    end: End
+
+    @property
+    def stable(self) -> np.ndarray:
+        """Whether each orbit is, (n,)."""
+        return np.array([orbit.stable for orbit in self.orbits])
+
+    def plot(self) -> "Figure":
+        """Amplitude, period and the largest multiplier over the parameter."""
+        from actuator.plots.orbits import plot_branch
+
+        return plot_branch(self)
 
 
 class Point(NamedTuple):
@@ -49,7 +91,7 @@ class BranchEnds:
     bounds: tuple[float, float]
     size: np.ndarray  # of the motion, by state
 
-    def crossed(self, points: list[Point], point: Point) -> End | None:
+    def find(self, points: list[Point], point: Point) -> End | None:
         """What a step has come across."""
         last = points[-1]
         if last.tangent[-1] * point.tangent[-1] < 0 and point.orbit.sequence != last.orbit.sequence:
@@ -83,7 +125,7 @@ class BranchEnds:
         return float(np.clip(point.value + (point.value - last.value) * b / (a - b), *self.bounds))
 
 
-def ended(points: list[Point], reason: str) -> End:
+def diagnose_end(points: list[Point], reason: str) -> End:
     """What is about to disappear on the last orbit, from which no step leads on."""
     last = points[-1].orbit
     value = points[-1].value

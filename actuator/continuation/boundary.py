@@ -10,10 +10,9 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from actuator.actuator import Actuator
-from actuator.continuation.branch import BOUND, Branch, End
-from actuator.continuation.continuation import follow
-from actuator.continuation.runs_over import Runs, moves
-from actuator.continuation.sampled import follow_sampled
+from actuator.continuation.bifurcations import BOUND, Branch, End
+from actuator.continuation.bisection import Runs, moves
+from actuator.continuation.continuation import continue_orbit
 from actuator.orbits.find import find_orbit
 from actuator.orbits.flow import NoOrbit
 from actuator.simulation.run import Run
@@ -22,11 +21,11 @@ from actuator.verdict.verdict import Hunting
 
 BEYOND = 0.01  # of the larger bound: how far behind the end of a family it is asked whether hunting goes on
 STEPS = 25  # of runs alone, from bound to bound
-MOST = 20  # stretches
-RUNS = "by runs alone"  # how a stretch without orbits ends where hunting goes on
+MOST = 20  # intervals
+RUNS = "by runs alone"  # how a interval without orbits ends where hunting goes on
 
 
-class Stretch(NamedTuple):
+class Interval(NamedTuple):
     """A range of the parameter in which one kind of hunting goes on."""
 
     begins: float
@@ -47,24 +46,24 @@ class Boundary:
         Where hunting ends.
     end : End
         How it ends there: as the last family of orbits does, or by "rest" or "diverging" of runs alone.
-    stretches : tuple of Stretch
+    intervals : tuple of Interval
         What hunts up to there, in the order in which it was followed.
     """
 
     parameter: str
     value: float
     end: End
-    stretches: tuple[Stretch, ...] = field(repr=False)
+    intervals: tuple[Interval, ...] = field(repr=False)
 
     @property
     def exact(self) -> bool:
         """Whether the value is the end of a family of orbits, and not resolved by runs."""
-        return self.stretches[-1].branch is not None
+        return self.intervals[-1].branch is not None
 
     @property
     def branches(self) -> tuple[Branch, ...]:
         """The families, each with its own end."""
-        return tuple(stretch.branch for stretch in self.stretches if stretch.branch is not None)
+        return tuple(interval.branch for interval in self.intervals if interval.branch is not None)
 
 
 def hunting_boundary(  # noqa: PLR0913 - what is simulated to find a cycle, and where
@@ -83,7 +82,7 @@ def hunting_boundary(  # noqa: PLR0913 - what is simulated to find a cycle, and 
     Parameters
     ----------
     plant : Actuator or HybridSystem
-        It must hunt at one of the bounds; with sampled controllers, the families are those of `follow_sampled`.
+        It must hunt at one of the bounds.
     parameter : str
         Name.
     bounds : (float, float)
@@ -105,27 +104,26 @@ def hunting_boundary(  # noqa: PLR0913 - what is simulated to find a cycle, and 
     for value, upward in ((bounds[0], True), (bounds[1], False)):
         run, verdict = runs.at(value, start)
         if verdict.cycles:
-            stretches = _walk(runs, run, verdict, value, bounds, upward)
-            last = stretches[-1]
-            return Boundary(parameter=parameter, value=last.end.value, end=last.end, stretches=tuple(stretches))
+            intervals = _walk(runs, run, verdict, value, bounds, upward)
+            last = intervals[-1]
+            return Boundary(parameter=parameter, value=last.end.value, end=last.end, intervals=tuple(intervals))
         reasons.append(f"at {value:g} it is {verdict.verdict!r} ({verdict.reason})")
     raise NoOrbit(f"no cycle at either bound of {parameter}: {'; '.join(reasons)}")
 
 
 def _family(runs: Runs, run: Run, bounds: tuple[float, float], upward: bool) -> Branch:
     """The family of the orbit that a run ends on."""
-    if runs.system.clocks:
-        return follow_sampled(runs.system, run, runs.parameter, bounds, upward=upward, compiled=runs.compiled)
-    return follow(find_orbit(runs.system, run, compiled=runs.compiled), runs.parameter, bounds, upward=upward)
+    orbit = find_orbit(runs.system, run, compiled=runs.compiled)
+    return continue_orbit(orbit, runs.parameter, bounds, upward=upward, compiled=runs.compiled)
 
 
 def _walk(  # noqa: PLR0913, PLR0917 - from where, in which direction
     runs: Runs, run: Run, verdict: Hunting, value: float, bounds: tuple[float, float], upward: bool
-) -> list[Stretch]:
-    """Stretches of hunting from a run at a value to where it ends."""
+) -> list[Interval]:
+    """Intervals of hunting from a run at a value to where it ends."""
     sign, goal = (1, bounds[1]) if upward else (-1, bounds[0])
     margin = BEYOND * max(abs(bounds[0]), abs(bounds[1]))
-    found: list[Stretch] = []
+    found: list[Interval] = []
     while len(found) < MOST:
         branch, why = None, verdict.reason
         if verdict.cycles:
@@ -135,7 +133,7 @@ def _walk(  # noqa: PLR0913, PLR0917 - from where, in which direction
                 why = str(error)
         if branch is not None:
             last, end = branch.orbits[-1], branch.end
-            found.append(Stretch(value, end.value, branch, end))
+            found.append(Interval(value, end.value, branch, end))
             begin = dict(zip((state.name for state in runs.system.states), last.x0.tolist(), strict=True))
             ahead, step = end.value, margin
         else:
@@ -148,8 +146,8 @@ def _walk(  # noqa: PLR0913, PLR0917 - from where, in which direction
             if not moves(verdict):
                 return found
             continue
-        stretch = (
-            found[-1] if found and found[-1].branch is None else Stretch(previous, value, None, End("", value, ""))
+        interval = (
+            found[-1] if found and found[-1].branch is None else Interval(previous, value, None, End("", value, ""))
         )
         if not moves(verdict):
             hunts, rests, verdict = runs.bisect(previous, before, value, verdict, bounds)
@@ -157,8 +155,8 @@ def _walk(  # noqa: PLR0913, PLR0917 - from where, in which direction
             end = End(verdict.verdict, middle, f"between runs at {hunts:.6g} and {rests:.6g}; {verdict.reason}")
         else:
             middle, end = value, End(RUNS, value, why)
-        merged = stretch._replace(ends=middle, end=end)
-        found = [*(found[:-1] if stretch in found else found), merged]
+        merged = interval._replace(ends=middle, end=end)
+        found = [*(found[:-1] if interval in found else found), merged]
         if not moves(verdict):
             return found
     raise NoOrbit(f"{runs.system.name}: hunting changes its kind {MOST} times up to {runs.parameter} = {value:.6g}")

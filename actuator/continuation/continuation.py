@@ -15,18 +15,26 @@ J. P. Kernevez, "Numerical analysis and control of bifurcation problems (I)", In
 """
 
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 
-from actuator.continuation.bifurcations import BranchEnds, Point, ended
-from actuator.continuation.branch import LOST, PERIOD_DOUBLING, TORUS, Branch, End
-from actuator.orbits.closed_orbit import CLOSED, FINISHED, finished
+from actuator.continuation.bifurcations import (
+    LOST,
+    PERIOD_DOUBLING,
+    TORUS,
+    Branch,
+    BranchEnds,
+    End,
+    Point,
+    diagnose_end,
+)
+from actuator.continuation.sampled import continue_sampled
 from actuator.orbits.flow import NoOrbit
-from actuator.orbits.one_period import find_return, one_period
 from actuator.orbits.orbit import Orbit
-from actuator.orbits.sampled import SampledOrbit
+from actuator.orbits.sampled import PeriodicOrbit, SampledOrbit
 from actuator.orbits.segments import Passage, Segment, passage
-from actuator.orbits.shooting import GROWN
+from actuator.orbits.shooting import CLOSED, FINISHED, GROWN, build_orbit, find_return, one_period
 from gear.quantities import require_known
 
 SEQUENCES = 4  # how often the events may turn out to be others than guessed
@@ -37,12 +45,19 @@ LONGEST = 400  # orbits in a family
 SHRINKS = 0.2  # factor on the amplitude below which a step has fallen into an equilibrium
 
 
-def follow(orbit: Orbit | SampledOrbit, parameter: str, bounds: tuple[float, float], *, upward: bool) -> Branch:
+def continue_orbit(
+    orbit: PeriodicOrbit,
+    parameter: str,
+    bounds: tuple[float, float],
+    *,
+    upward: bool,
+    compiled: bool | None = None,
+) -> Branch:
     """The family of an orbit over a parameter, in one direction, to its end or to a bound.
 
     Parameters
     ----------
-    orbit : Orbit
+    orbit : Orbit or SampledOrbit
         Where to start.
     parameter : str
         Name.
@@ -50,41 +65,45 @@ def follow(orbit: Orbit | SampledOrbit, parameter: str, bounds: tuple[float, flo
         Of the parameter; their distance sizes the steps.
     upward : bool
         Whether to set out towards the larger bound.
+    compiled : bool or None
+        With sampled controllers as for `simulate`; an Orbit goes on as it was found.
 
     Returns
     -------
     Branch
+        With sampled controllers a fold is not told from other ends ("lost"), as only one side of it is followed.
 
     Raises
     ------
     KeyError
         Unknown parameter (the nearest names are given).
     ValueError
-        Bounds that do not hold the orbit, or an orbit of a sampled system.
+        Bounds that do not hold the orbit.
     """
-    if isinstance(orbit, SampledOrbit):
-        raise ValueError(f"follow: {orbit.system.name} is sampled; its families are those of follow_sampled")
-    return _Follower(orbit, parameter, bounds).follow(upward)
+    names = [quantity.name for quantity in orbit.system.parameters]
+    require_known([parameter], names, "parameter")
+    value = float(orbit.p[names.index(parameter)])
+    if not bounds[0] < bounds[1] or not bounds[0] <= value <= bounds[1]:
+        raise ValueError(
+            f"continue_orbit: {parameter} = {value:.6g} must lie between its bounds {bounds[0]:g}, {bounds[1]:g}"
+        )
+    if orbit.system.clocks:
+        return continue_sampled(cast("SampledOrbit", orbit), parameter, bounds, upward=upward, compiled=compiled)
+    return _Continuation(cast("Orbit", orbit), parameter, bounds).run(upward)
 
 
-class _Follower:
+class _Continuation:
     """What stays the same along a family."""
 
     def __init__(self, orbit: Orbit, parameter: str, bounds: tuple[float, float]) -> None:
         names = [quantity.name for quantity in orbit.system.parameters]
-        require_known([parameter], names, "parameter")
         self.parameter, self.index = parameter, names.index(parameter)
         self.first, self.machine = orbit, orbit.map
-        value = float(orbit.p[self.index])
-        if not bounds[0] < bounds[1] or not bounds[0] <= value <= bounds[1]:
-            raise ValueError(
-                f"follow: {parameter} = {value:.6g} must lie between its bounds {bounds[0]:g}, {bounds[1]:g}"
-            )
         self.width = bounds[1] - bounds[0]
         self.size = np.maximum(np.ptp(orbit.path[1], axis=1), orbit.map.nominal)
         self.ends = BranchEnds(orbit, bounds, self.size)
 
-    def follow(self, upward: bool) -> Branch:
+    def run(self, upward: bool) -> Branch:
         points = [self._tangent(self.first, None, upward)]
         step, end = FIRST, None
         while end is None:
@@ -94,9 +113,9 @@ class _Follower:
             except NoOrbit as error:
                 step /= 2
                 if step < SMALLEST:
-                    end = ended(points, str(error))
+                    end = diagnose_end(points, str(error))
                 continue
-            end = self.ends.crossed(points, point)
+            end = self.ends.find(points, point)
             if end is None or end.kind in (PERIOD_DOUBLING, TORUS):
                 points.append(point)
                 step = min(1.3 * step, LARGEST)
@@ -147,20 +166,20 @@ class _Follower:
             pieces = one_period(self.machine, x, m, u, p, orbit.period)
         anchor = np.append(x / self.size, p[self.index] / self.width)
         for attempt in range(SEQUENCES):
-            x, p, closed, residual = self._corrected(x, p, pieces, last, anchor)
+            x, p, closed, residual = self._correct(x, p, pieces, last, anchor)
             try:
-                found = finished(self.machine, x, u, p, [closed], residual)
+                found = build_orbit(self.machine, x, u, p, [closed], residual)
             except NoOrbit:  # closed, but with events that the motion there does not have
                 if attempt == SEQUENCES - 1:
                     raise
                 pieces = one_period(self.machine, x, m, u, p, closed.duration)
                 continue
             point = self._tangent(found, last.tangent)
-            self._plausible(last, point)
+            self._require_near(last, point)
             return point
         raise AssertionError
 
-    def _corrected(
+    def _correct(
         self, x: np.ndarray, p: np.ndarray, pieces: Sequence[Segment], last: Point, anchor: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, Passage, float]:
         """State and parameter in the plane through the anchor, across the tangent, that close the given segments."""
@@ -182,7 +201,7 @@ class _Follower:
             pieces = list(around.segments)
         raise NoOrbit(f"{self.machine.system.name}: the correction does not converge, the residual is {residual:.3g}")
 
-    def _plausible(self, last: Point, point: Point) -> None:
+    def _require_near(self, last: Point, point: Point) -> None:
         """Raise where a step has jumped to another orbit."""
         ratio = point.orbit.period / last.orbit.period
         size = point.orbit.load_amplitude / last.orbit.load_amplitude

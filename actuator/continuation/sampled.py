@@ -7,62 +7,23 @@ few simulated cycles closed by Newton's method, until none closes.
 
 import numpy as np
 
-from actuator.actuator import Actuator
-from actuator.continuation.branch import BOUND, LOST, Branch, End
-from actuator.orbits.find_sampled import close_sampled, find_sampled_orbit, resting_point
+from actuator.continuation.bifurcations import BOUND, LOST, Branch, End
+from actuator.orbits.find_sampled import close_sampled, resting_point
 from actuator.orbits.flow import NoOrbit
-from actuator.orbits.sampled import SampledOrbit, continued
-from actuator.simulation.run import Run
-from actuator.system.hybrid import HybridSystem
-from gear.quantities import require_known
+from actuator.orbits.sampled import SampledOrbit, continue_run
 
 FIRST, LARGEST, SMALLEST = 0.05, 0.2, 1e-3  # steps over the width of the bounds
 GROWS = 1.5
 CYCLES = 15  # from the last orbit to a new one: near its end a cycle settles slowly
 
 
-def follow_sampled(
-    plant: Actuator | HybridSystem,
-    run: Run,
-    parameter: str,
-    bounds: tuple[float, float],
-    *,
-    upward: bool = True,
-    compiled: bool | None = None,
+def continue_sampled(
+    orbit: SampledOrbit, parameter: str, bounds: tuple[float, float], *, upward: bool, compiled: bool | None
 ) -> Branch:
-    """Follow the cycle that a run ends in over a parameter, from its value in the run to where the cycle ends.
-
-    Parameters
-    ----------
-    plant : Actuator or HybridSystem
-        The system of the run, with clocks.
-    run : Run
-        It must end in a cycle.
-    parameter : str
-        Name.
-    bounds : (float, float)
-        Between which the family is followed.
-    upward : bool
-        Direction.
-    compiled : bool or None
-        As for `simulate`.
-
-    Returns
-    -------
-    Branch
-        Of SampledOrbit. A fold is not told from other ends ("lost"), as only one side of it is followed.
-
-    Raises
-    ------
-    NoOrbit
-        Where the run has no cycle that closes.
-    """
-    system = plant.system() if isinstance(plant, Actuator) else plant
-    names = [quantity.name for quantity in system.parameters]
-    require_known([parameter], names, "parameter")
+    """The family of a sampled orbit over a parameter, as `continue_orbit`."""
+    names = [quantity.name for quantity in orbit.system.parameters]
     index, width, sign = names.index(parameter), bounds[1] - bounds[0], 1 if upward else -1
-    orbits = [find_sampled_orbit(system, run, compiled=compiled)]
-    values = [float(orbits[0].p[index])]
+    orbits, values = [orbit], [float(orbit.p[index])]
     step, failure = FIRST * width, ""
     while step > SMALLEST * width:
         value = min(max(values[-1] + sign * step, bounds[0]), bounds[1])
@@ -86,7 +47,7 @@ def _next(last: SampledOrbit, index: int, value: float, compiled: bool | None) -
     system, p = last.system, last.p.copy()
     p[index] = value
     start = {q.name: float(number) for q, number in zip(system.states, last.x0, strict=True)}
-    run = continued(system, start, last.u, p, CYCLES * last.period, compiled)
+    run = continue_run(system, start, last.u, p, CYCLES * last.period, compiled)
     same = [change.time for change in run.changes if change[1:] == run.changes[-1][1:]]
     if len(same) < 2 or run.t[-1] - same[-1] > last.period:  # noqa: PLR2004 - two returns
         raise NoOrbit(f"at {value:.6g} the motion comes to rest")

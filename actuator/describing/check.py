@@ -27,8 +27,7 @@ from actuator.describing.describing import (
 from actuator.linear.model import linearize
 from actuator.linear.operating_point import OperatingPoint
 from actuator.linear.trim import trim
-from actuator.orbits.orbit import Orbit
-from actuator.orbits.sampled import SampledOrbit
+from actuator.orbits.sampled import PeriodicOrbit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -54,7 +53,7 @@ class DescribingCheck:
         Amplitudes of the orbit's load speed [rad/s], from the first harmonic on.
     """
 
-    orbit: Orbit | SampledOrbit = field(repr=False)
+    orbit: PeriodicOrbit = field(repr=False)
     loop: control.StateSpace = field(repr=False)
     coulomb: float
     cycles: tuple[PredictedCycle, ...]
@@ -108,7 +107,7 @@ class DescribingCheck:
         return figure
 
 
-def check_describing_function(plant: Actuator, orbit: Orbit | SampledOrbit) -> DescribingCheck:
+def check_describing_function(plant: Actuator, orbit: PeriodicOrbit) -> DescribingCheck:
     """The prediction by describing functions for an actuator that is on a known orbit.
 
     Parameters
@@ -140,10 +139,7 @@ def _at_load(point: OperatingPoint) -> float:
     return point.outputs["motor_torque"] * point.outputs["motor_angle"] / point.outputs["motor_angle_at_load"]
 
 
-def _harmonics(orbit: Orbit | SampledOrbit) -> np.ndarray:
+def _harmonics(orbit: PeriodicOrbit) -> np.ndarray:
     """Amplitudes of the harmonics of the load's speed, (9,)."""
-    if isinstance(orbit, SampledOrbit):
-        time, speed = orbit.run.t, orbit.run["load_speed"]
-    else:
-        time, speed = orbit.path[0], orbit.signals(["load_speed"])["load_speed"]
-    return np.abs(first_harmonic(time, speed, 1 / orbit.period))
+    speed = orbit.signals(["load_speed"])["load_speed"]
+    return np.abs(first_harmonic(orbit.times, speed, 1 / orbit.period))

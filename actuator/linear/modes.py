@@ -9,8 +9,9 @@ import control
 import numpy as np
 
 from actuator.actuator import Actuator
+from actuator.linear.loop import loop_transfer
 from actuator.linear.margins.crossings import Margins, margins
-from actuator.linear.model import linearize, loop_transfer
+from actuator.linear.model import linearize
 from actuator.linear.operating_point import MOTIONS, NoEquilibrium, OperatingPoint
 from actuator.linear.sampled import without_counts
 from actuator.linear.trim import trim

@@ -1,4 +1,4 @@
-"""Poles of an actuator in one contact mode: how fast, how damped, and which part each of them belongs to."""
+"""Poles of a model: how fast and how damped, what each of them belongs to, and how far rounding may have moved it."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -6,17 +6,39 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import eig
+from scipy.linalg import eig, matrix_balance
 
 from actuator.linear.model import least_dynamics
 from actuator.linear.operating_point import OperatingPoint
 
 if TYPE_CHECKING:
     import xarray
-
 LEAST = 0.02  # share of a state that is worth a word
 AT_ONCE = 1e-12  # a pole z of which nothing is left after one period
 RIGID = 1e-7  # part of the fastest pole below which a pole is at zero
+
+
+def room(a: np.ndarray, *, discrete: bool) -> float:
+    """How far within the boundary of stability the poles are, each moved there by what may be its rounding.
+
+        n eps |A| / |y x|,    at most sqrt(n eps) |A|
+
+    is what errors of n eps in the balanced matrix make of a simple pole with left and right eigenvectors y and x of
+    length one, and of a double one. Negative where one is unstable beyond doubt; [1/s], or of |z| in discrete time.
+
+    References
+    ----------
+    Golub, Van Loan, "Matrix Computations", 4th edition, 2013, section 7.2.2 (condition of an eigenvalue).
+    """
+    if not len(a):
+        return math.inf
+    balanced = np.asarray(matrix_balance(a, permute=False)[0])
+    poles, left, right = eig(balanced, left=True, right=True)  # pyright: ignore[reportAssignmentType] - stubs of three answers
+    size, error = np.linalg.norm(balanced, 2), len(a) * np.finfo(float).eps
+    aligned = abs((left.conj() * right).sum(axis=0))
+    moved = size * error / np.maximum(aligned, math.sqrt(error))
+    beyond = abs(poles) - 1 if discrete else np.real(poles)
+    return float((moved - beyond).min())
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from actuator.actuator import Actuator
-from actuator.linear.balance import Balance
+from actuator.linear.jacobians import eliminated, rates_function, rates_jacobian, rounding, slips
 from actuator.linear.operating_point import STOPS, NoEquilibrium, OperatingPoint, modes_of, usual_flank
 from actuator.simulation.run import contact_labels
 from actuator.system.hybrid import HybridSystem
@@ -17,6 +17,50 @@ POLISH = 3  # more of them once the residual is small, as long as it falls
 SETTLING = 1e-5 * 2.0 ** np.arange(34)  # s, up to a day
 SLOWEST = 1e-6  # rate [1/s] of a row that still counts in full: of what no state moves, rounding would count for all
 HOLDS = -1e-6  # a margin below this does not hold
+
+
+class Balance:
+    """The equations of a contact mode, in states over their nominal sizes, without what stuck contacts lock."""
+
+    def __init__(  # noqa: PLR0913, PLR0917 - a place in a mode of a system
+        self, system: HybridSystem, x: np.ndarray, m: np.ndarray, u: np.ndarray, p: np.ndarray, free: np.ndarray
+    ) -> None:
+        self.system, self.m, self.u, self.p, self.free = system, m, u, p, free
+        self.scale = np.array([quantity.nominal for quantity in system.states])
+        # what stuck contacts lock is no unknown: the balance of its torques holds whatever they are, but for rounding
+        start = OperatingPoint(system=system, x=x, m=m, u=u, p=p, rates=np.zeros_like(x))
+        self.expressed, self.kept = eliminated([row * self.scale for row in slips(start)], len(x))
+        unknown = np.flatnonzero(free[self.kept])  # a drifting state may have any constant rate
+        self.equations, self.moves = np.array(self.kept)[unknown], self.expressed[:, unknown]
+
+    def unlocked(self, state: np.ndarray) -> np.ndarray:
+        """The state, with what is locked as the others have it."""
+        return self.scale * (self.expressed @ (state / self.scale)[self.kept])
+
+    def flow(self, state: np.ndarray) -> np.ndarray:
+        """dx/dt."""
+        return rates_function(self.system)(state, self.m, self.u, self.p).full().ravel()
+
+    def residual(self, state: np.ndarray) -> np.ndarray:
+        """Rates that should be zero."""
+        return (self.flow(state) / self.scale)[self.equations]
+
+    def slopes(self, state: np.ndarray) -> np.ndarray:
+        """Their derivatives by the unknowns."""
+        matrix = rates_jacobian(self.system)(state, self.m, self.u, self.p).full()
+        return (matrix / self.scale[:, None] * self.scale)[self.equations] @ self.moves
+
+    def rounding(self, state: np.ndarray) -> np.ndarray:
+        """What is left of the rates by rounding."""
+        return rounding(self.system, state, self.m, self.u, self.p)
+
+    def left(self, state: np.ndarray) -> np.ndarray:
+        """Sizes of all rates that should be zero."""
+        return abs(np.where(self.free, self.unlocked(self.flow(state)) / self.scale, 0.0))
+
+    def holds(self, state: np.ndarray) -> bool:
+        """Whether nothing changes, but for rounding."""
+        return bool((self.left(state) <= self.rounding(state)).all())
 
 
 def _turned(margins: Mapping[str, float], flanks: Mapping[str, int]) -> dict[str, int]:

@@ -2,15 +2,12 @@
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 
-from actuator.actuator import Actuator
 from actuator.orbits.flow import NoOrbit
-from actuator.orbits.run_end import cycle_at_end
-from actuator.orbits.sampled import SampledOrbit, continued
-from actuator.orbits.tick_map import TickMap, tick_map
+from actuator.orbits.sampled import SampledOrbit, TickMap, continue_run, tick_map
 from actuator.simulation.run import Run, find_standstill
 from actuator.system.hybrid import HybridSystem
 
@@ -23,40 +20,17 @@ DIVERGES = 1e6  # residual over nominal sizes at which the search ends
 PERIODS = 5  # how many numbers of ticks are tried
 
 
-def find_sampled_orbit(
-    plant: Actuator | HybridSystem,
-    run: Run,
-    *,
-    inputs: Mapping[str, float] | None = None,
-    parameters: Mapping[str, float] | None = None,
-    compiled: bool | None = None,
+def find_sampled(  # noqa: PLR0913, PLR0917 - the cycle at the end of a run
+    system: HybridSystem, run: Run, period: float, u: np.ndarray, p: np.ndarray, *, compiled: bool | None
 ) -> SampledOrbit:
-    """The exact periodic orbit near the cycle that a run of a sampled system ends in.
-
-    Parameters
-    ----------
-    plant : Actuator or HybridSystem
-        The system of the run, with clocks.
-    run : Run
-        It must end in a cycle (`classify` says so).
-    inputs, parameters : mapping of str to float
-        By name where they are to differ from those at the end of the run.
-    compiled : bool or None
-        As for `simulate`.
-
-    Returns
-    -------
-    SampledOrbit
-        With the number of ticks nearest to the period of the cycle with which it closes.
+    """The orbit near the cycle of this period that a run ends in, with the nearest number of ticks that closes.
 
     Raises
     ------
     NoOrbit
-        Where the run does not end in a cycle, or no number of ticks near its period closes it.
+        Where no number of ticks near the period closes it.
     """
-    system = plant.system() if isinstance(plant, Actuator) else plant
-    period, u, p = cycle_at_end(system, run, inputs, parameters)
-    more = continued(system, run.state(), u, p, PERIODS_ON * period, compiled)
+    more = continue_run(system, run.state(), u, p, PERIODS_ON * period, compiled)
     x, m = resting_point(more, period)
     return close_sampled(system, x, m, u, p, period, compiled=compiled)
 
@@ -73,7 +47,10 @@ def close_sampled(  # noqa: PLR0913, PLR0917 - where to search, and how
 ) -> SampledOrbit:
     """The orbit through the neighborhood of a state before a tick, by Newton's method.
 
-    Errors as `find_sampled_orbit`.
+    Raises
+    ------
+    NoOrbit
+        Where no number of ticks near the period closes it.
     """
     ticks = tick_map(system, compiled)
     hyper = system.hyperperiod
@@ -81,7 +58,7 @@ def close_sampled(  # noqa: PLR0913, PLR0917 - where to search, and how
     reasons = []
     for count in itertools.islice(_outward(nearest), PERIODS):
         try:
-            return _closed(ticks, x, m, u, p, count * hyper)
+            return _close(ticks, x, m, u, p, count * hyper)
         except NoOrbit as error:
             reasons.append(f"{count * hyper} ticks: {error}")
     raise NoOrbit(
@@ -118,7 +95,7 @@ def resting_point(run: Run, period: float) -> tuple[np.ndarray, np.ndarray]:
     return np.where(held, before, after), run.mode_values[:, index]
 
 
-def _closed(ticks: TickMap, x: np.ndarray, m: np.ndarray, u: np.ndarray, p: np.ndarray, count: int) -> SampledOrbit:
+def _close(ticks: TickMap, x: np.ndarray, m: np.ndarray, u: np.ndarray, p: np.ndarray, count: int) -> SampledOrbit:
     scale, best, since = ticks.scale, math.inf, 0
     for _ in range(NEWTON_STEPS):
         end, modes, moved = ticks.passage(x, m, u, p, count)
@@ -126,7 +103,7 @@ def _closed(ticks: TickMap, x: np.ndarray, m: np.ndarray, u: np.ndarray, p: np.n
         if not np.array_equal(modes, m) or not residual < DIVERGES:
             raise NoOrbit(f"the modes do not return, or the residual grew to {residual:.3g}")
         if residual < FINISHED or (best < CLOSED and residual >= best / 2):
-            return _finished(ticks, x, m, u, p, count, residual, moved)
+            return _build_orbit(ticks, x, m, u, p, count, residual, moved)
         since = 0 if residual < best else since + 1
         if since >= PATIENCE:
             break
@@ -136,7 +113,7 @@ def _closed(ticks: TickMap, x: np.ndarray, m: np.ndarray, u: np.ndarray, p: np.n
     raise NoOrbit(f"the residual over nominal sizes stays at {best:.3g}")
 
 
-def _finished(  # noqa: PLR0913, PLR0917 - all that an orbit is
+def _build_orbit(  # noqa: PLR0913, PLR0917 - all that an orbit is
     ticks: TickMap,
     x: np.ndarray,
     m: np.ndarray,

@@ -1,27 +1,92 @@
 """The motion of a system in fixed modes as a function, with exact derivatives.
 
 What the engine does in one integration is taken apart here: in each smooth segment the modes are fixed and known, so
-the integrator needs no events. The flow may have corners inside a mode (a limit that is met, say): on each side of one
-it is smooth, and the sides are held like the modes.
+the integrator needs no events. The flow may have switching surfaces inside a mode: limits that are met, damping that is
+cut off, tables with straight pieces. An integrator that steps over one gives the state well and its derivatives badly.
+So they are read off the expressions themselves: fmax(a, b), fmin(a, b) and a condition a < b have one where a - b is
+zero, fabs(a) and sign(a) where a is. With each of them held on one side, by a number of its own, the expressions are
+smooth, and the sides are held like the modes.
 """
 
 import contextlib
 import io
 from collections.abc import Sequence
 from functools import lru_cache, partial
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
-from actuator.orbits.switching_surfaces import hold_corners
 from actuator.simulation.compiled import compiled_where_wanted
 from actuator.system.hybrid import MARGIN_BAND, HybridSystem
 
+ORDERS = {ca.OP_FMAX, ca.OP_FMIN, ca.OP_LT, ca.OP_LE}
+SIZES = {ca.OP_FABS, ca.OP_SIGN}
 TOLERANCE = 1e-10  # local error of each state over its nominal size
 FINEST_RELATIVE = 1e-13  # relative tolerance below which an integrator counts rounding
 BLOCK = 4  # directions differentiated at once; compiling takes as long as there are directions
 POINTS = 200  # output points of a segment
 GRID = np.linspace(0, 1, POINTS + 1) ** 3  # parts of a segment; it starts with the fast transients
+
+
+class Smooth(NamedTuple):
+    """Expressions of (x, m, u, p) with their corners held."""
+
+    arguments: list[ca.SX]  # x, m, u, p
+    sides: ca.SX  # (K, 1): +1 or -1, the side of each corner
+    results: list[ca.SX]  # smooth while the sides are held
+    corners: ca.SX  # (K, 1): zero at the corner, with the sign of the side; with the other corners held
+    true_corners: ca.SX  # (K, 1): with nothing held
+
+
+def hold_corners(function: ca.Function) -> Smooth:
+    """The results of an SX function of (x, m, u, p) with every corner in x held on one side."""
+    arguments = [ca.SX.sym(name, function.size1_in(k)) for k, name in enumerate("xmup")]
+    _, true = _walk(function, arguments, None)
+    sides = ca.SX.sym("sides", len(true))
+    results, held = _walk(function, arguments, sides)
+    return Smooth(arguments, sides, results, *(ca.vertcat(ca.SX(0, 1), *kinks) for kinks in (held, true)))
+
+
+def _walk(function: ca.Function, arguments: list[ca.SX], sides: ca.SX | None) -> tuple[list[ca.SX], list[ca.SX]]:
+    """Results of the function and its corners, operation by operation; `sides` None for nothing held."""
+    entries = [ca.vertsplit(argument) for argument in arguments]
+    results = [ca.SX(function.sparsity_out(k)) for k in range(function.n_out())]
+    work: dict[int, ca.SX] = {}
+    corners: list[ca.SX] = []
+    for k in range(function.n_instructions()):
+        operation, read, written = (
+            function.instruction_id(k),
+            function.instruction_input(k),
+            function.instruction_output(k),
+        )
+        if operation == ca.OP_INPUT:
+            work[written[0]] = entries[read[0]][read[1]]
+        elif operation == ca.OP_CONST:
+            work[written[0]] = ca.SX(function.instruction_constant(k))
+        elif operation == ca.OP_OUTPUT:
+            results[written[0]].nz[written[1]] = work[read[0]]
+        else:
+            values = [work[index] for index in read]
+            corner = values[0] - values[1] if operation in ORDERS else values[0] if operation in SIZES else None
+            if corner is not None and ca.depends_on(corner, arguments[0]):
+                corners.append(corner)
+                if sides is not None:
+                    work[written[0]] = _held(operation, values, sides[len(corners) - 1] > 0)
+                    continue
+            work[written[0]] = (ca.SX.unary if len(values) == 1 else ca.SX.binary)(operation, *values)
+    return results, corners
+
+
+def _held(operation: int, values: list[ca.SX], above: ca.SX) -> ca.SX:
+    """The operation on one side of its corner."""
+    if operation == ca.OP_FMAX:
+        return ca.if_else(above, values[0], values[1])
+    if operation == ca.OP_FMIN:
+        return ca.if_else(above, values[1], values[0])
+    if operation == ca.OP_FABS:
+        return ca.if_else(above, values[0], -values[0])
+    return 2 * above - 1 if operation == ca.OP_SIGN else 1 - above
 
 
 class NoOrbit(RuntimeError):

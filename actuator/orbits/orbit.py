@@ -132,8 +132,13 @@ class Orbit:
             began += segment.duration
         return np.concatenate(times), np.hstack(states), owners
 
+    @property
+    def times(self) -> np.ndarray:
+        """Of `path` and `signals` [s]."""
+        return self.path[0]
+
     def signals(self, names: Sequence[str]) -> dict[str, np.ndarray]:
-        """Outputs by name at the times of `path`."""
+        """Outputs by name at `times`."""
         _, states, owners = self.path
         index = [quantity.name for quantity in self.system.outputs]
         modes = np.array([self.segments[k].modes for k in owners], float).T

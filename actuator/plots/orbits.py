@@ -14,7 +14,7 @@ from actuator.simulation.run import contact_labels
 from gear.quantities import require_known
 
 if TYPE_CHECKING:
-    from actuator.continuation.branch import Branch
+    from actuator.continuation.bifurcations import Branch
 
 
 def plot_orbit(orbit: Orbit, names: Sequence[str]) -> Figure:

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from actuator.actuator import Actuator
-from actuator.orbits.cut_motion import cut_motion
 from actuator.orbits.flow import FlowMap, NoOrbit, flow_map
+from actuator.orbits.segments import cut_motion
 from actuator.simulation.engine import engine
 from actuator.simulation.prepared import EngineOptions
 from actuator.simulation.run import STUCK, contact_labels, is_at_rest

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from actuator import NoOrbit, SimulationError, find_orbit, follow
-from actuator.continuation.branch import BOUND
+from actuator import NoOrbit, SimulationError, continue_orbit, find_orbit
+from actuator.continuation.bifurcations import BOUND
 from actuator.verdict.verdict import CYCLES, IRREGULAR, REST, UNDECIDED
 from studies.cache import Stages
 from studies.corners import meaning
@@ -62,7 +62,7 @@ def end_of(plan: Plan, index: Index) -> EndPoint:
         ends = []
         bounds = (min(axis.values), max(axis.values))
         for upward in _ways(plan, index):
-            branch = follow(orbit, axis.name, bounds, upward=upward)
+            branch = continue_orbit(orbit, axis.name, bounds, upward=upward)
             ends.append(EndPoint(float(branch.end.value), branch.end.kind, branch.end.reason))
     except (NoOrbit, SimulationError) as error:
         return EndPoint(math.nan, NO_END, str(error))

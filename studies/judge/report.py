@@ -8,9 +8,8 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from actuator import Orbit
 from actuator.diagnosis.countermeasures import Remedy, cells
-from actuator.orbits.sampled import SampledOrbit
+from actuator.orbits.sampled import PeriodicOrbit
 from actuator.plots.linear import plot_bode
 from actuator.plots.runs import plot_run
 from actuator.stiction.margins import MOST
@@ -42,7 +41,7 @@ def figures(judgment: Judgment) -> dict[str, Figure]:
         loops = {model.mode: model.loops[name] for model in judgment.models if model.loops}
         found[f"bode_{name}"] = plot_bode(loops, f"Loop transfer, opened at {name.replace('_', ' ')}")
     insight = judgment.insight
-    if isinstance(insight.orbit, Orbit):
+    if insight.orbit is not None:
         found["orbit"] = insight.orbit.plot()
     for name, part in (("causes", insight.causes), ("remedies", insight.remedies)):
         if part is not None:
@@ -101,7 +100,7 @@ def _insight(insight: Insight) -> dict[str, Any]:
     }
 
 
-def _orbit(orbit: Orbit | SampledOrbit) -> dict[str, Any]:
+def _orbit(orbit: PeriodicOrbit) -> dict[str, Any]:
     found = {
         "period_s": orbit.period,
         "amplitude_rad": orbit.load_amplitude,
@@ -112,7 +111,7 @@ def _orbit(orbit: Orbit | SampledOrbit) -> dict[str, Any]:
         "multipliers": [{"real": float(mu.real), "imaginary": float(mu.imag)} for mu in orbit.multipliers],
         "events": [event._asdict() for event in orbit.events],
     }
-    if isinstance(orbit, Orbit):
+    if orbit.trivial_error is not None:
         found["error_of_trivial_multiplier"] = float(orbit.trivial_error)
     return found
 

@@ -28,9 +28,8 @@ from actuator import (
 )
 from actuator.diagnosis.causes import Causes, find_causes
 from actuator.diagnosis.countermeasures import Remedy, RemedySearch, RemedyTable
-from actuator.orbits.find_sampled import find_sampled_orbit
 from actuator.orbits.flow import flow_map
-from actuator.orbits.sampled import SampledOrbit
+from actuator.orbits.sampled import PeriodicOrbit, SampledOrbit
 from actuator.simulation.many import processes
 from actuator.simulation.signals import piece_at
 from actuator.stiction.margins import HuntingMargin, MarginKind, find_scaled, hunting_margin
@@ -91,7 +90,7 @@ class Insight:
         Why a part is not there.
     """
 
-    orbit: Orbit | SampledOrbit | None = None
+    orbit: PeriodicOrbit | None = None
     margins: dict[str, HuntingMargin] = field(default_factory=dict)
     causes: Causes | None = None
     remedies: RemedyTable | None = None
@@ -189,16 +188,16 @@ class _Inside:
             remedies = self.remedies(search, lambda share: tell(CAUSES + (1 - CAUSES) * share)) if search else None
         return Insight(orbit=orbit, margins=margins, causes=causes, remedies=remedies, missing=self.missing)
 
-    def orbit(self) -> Orbit | SampledOrbit | None:
+    def orbit(self) -> PeriodicOrbit | None:
         """The exact cycle, from its numbers."""
         actuator = self.case.actuator
-        kind, find = (Orbit, find_orbit) if actuator.sampling is None else (SampledOrbit, find_sampled_orbit)
+        kind = Orbit if actuator.sampling is None else SampledOrbit
         hints = {name: hint for name, hint in get_type_hints(kind).items() if name not in BUILT}
 
         def numbers() -> dict[str, Any]:
             if actuator.sampling is not None:
                 self._require_short()
-            found = find(actuator, self.run)
+            found = find_orbit(actuator, self.run)
             return {name: CONVERTER.unstructure(getattr(found, name)) for name in hints}
 
         try:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from actuator.actuator import Actuator
-from actuator.linear.balance import rates_function, rounding
+from actuator.linear.jacobians import rates_function, rounding
 from actuator.linear.modes import mode_models
 from actuator.linear.operating_point import NoEquilibrium, OperatingPoint
 from actuator.linear.trim import trim

@@ -14,7 +14,7 @@ from scipy.linalg import expm, expm_frechet
 from actuator.linear.derivatives.sampled import SampledGainModel
 from actuator.linear.derivatives.slopes import along, flow_slopes, places, point_moves, split, symbols
 from actuator.linear.jacobians import require_smooth
-from actuator.linear.model import ticks_between
+from actuator.linear.loop import ticks_between
 from actuator.linear.operating_point import OperatingPoint
 from actuator.system.builder import PREFIX
 from actuator.system.hybrid import HybridSystem

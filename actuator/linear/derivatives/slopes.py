@@ -6,7 +6,7 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 
-from actuator.linear.balance import rates_function
+from actuator.linear.jacobians import rates_function
 from actuator.linear.operating_point import OperatingPoint
 from actuator.system.hybrid import HybridSystem
 from gear.quantities import require_known

@@ -8,7 +8,7 @@ import control
 import numpy as np
 from scipy.optimize import brentq
 
-from actuator.linear.stability import room
+from actuator.linear.poles import room
 
 GAINS = np.logspace(-4, 4, 1601)  # factors on the loop gain that are tried
 PHASES = np.linspace(0, math.pi, 721)  # rad

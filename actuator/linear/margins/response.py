@@ -7,7 +7,7 @@ import control
 import numpy as np
 from scipy.optimize import brentq
 
-from actuator.linear.stability import room
+from actuator.linear.poles import room
 
 NOTHING = 1e-9  # loop gain of a loop that is not there: a stuck gear passes nothing on; of an integrator, its inverse
 GRID = np.logspace(-6, 6, 6001)  # rad/s, on which crossings are bracketed

@@ -8,8 +8,9 @@ import control
 import numpy as np
 
 from actuator.linear.bode import FREQUENCIES
+from actuator.linear.loop import loop_transfer
 from actuator.linear.margins.crossings import CUT, SLOW
-from actuator.linear.model import linearize, loop_transfer
+from actuator.linear.model import linearize
 from actuator.linear.operating_point import OperatingPoint
 
 

@@ -5,8 +5,8 @@ with limited torque; the times of the engine's own events for a loop with backla
 """
 
 import math
-from types import SimpleNamespace
 
+import casadi as ca
 import numpy as np
 import pytest
 from mass_on_guide import MassOnGuide
@@ -28,28 +28,39 @@ from actuator import (
 )
 from actuator.parts.sensors import AngleSensor, Sensors
 from actuator.simulation.run import Statistics
-from actuator.system.hybrid import Quantity
+from actuator.system.hybrid import HybridSystem, Quantity
 from actuator.verdict.peaks import find_turning_points
 from controllers import PID, Sampling
 from gear import Backlash, Bearing, Coulomb, Coupling, ExternalPair, Linear, Mesh, Shaft, Transmission
+from gear.quantities.roles import ControllerMemory, Heat
 
 CONTACT = "gear.bearings.only"
 
 # -- runs by hand -------------------------------------------------------------------------------------------
 
 
-def run_of(time, load, *, changes=(), mode="forward", reference=None, integral=None):
+def run_of(time, load, *, changes=(), mode="forward", integral=None, losses=None, **signals):
     """A run in which the load, and the motor ten times as far, moved as given, with one contact."""
-    signals = {"load_angle": load, "motor_angle": 10 * load}
-    inputs, states = (), ()
-    if reference is not None:
-        inputs, signals["reference"] = (Quantity("reference", "rad"),), reference
-    if integral is not None:
-        states, signals["controller.integral"] = (Quantity("controller.integral", "N m"),), integral
+    signals = {"load_angle": load, "motor_angle": 10 * load} | signals | (losses or {})
+    states = () if integral is None else (Quantity("controller.integral", "N m", roles=(ControllerMemory(),)),)
+    signals |= {} if integral is None else {"controller.integral": integral}
     words = np.array([mode, *(after for _, after in changes)])
     row = words[np.searchsorted([moment for moment, _ in changes], time, side="right")]
+    none = ca.Function("none", [], [])
     return Run(
-        system=SimpleNamespace(inputs=inputs, states=states),
+        system=HybridSystem(
+            name="by hand",
+            states=states,
+            mode_variables=(),
+            inputs=(Quantity("reference", "rad"),) if "reference" in signals else (),
+            outputs=tuple(Quantity(name, "W", roles=(Heat(name),)) for name in losses or {}),
+            events=(),
+            parameters=(),
+            flow=none,
+            margins=none,
+            reset=none,
+            outputs_function=none,
+        ),
         t=time,
         signals=signals,
         units=dict.fromkeys(signals, "rad"),
@@ -422,11 +433,13 @@ def test_wear_of_a_cycle_is_what_is_counted_by_hand():
 
 def test_current_and_loss_are_means_over_the_period():
     time = np.linspace(0, 30, 30_001)
-    run = run_of(time, np.sin(2 * np.pi * time))
-    run.signals["current"] = 3 + 4 * math.sqrt(2) * np.sin(2 * np.pi * time)
-    run.signals["copper_loss"] = 2 + np.sin(2 * np.pi * time)
-    run.signals["friction_loss"] = 0.5 + 0 * time
-    run.signals["gear.bearings.only.friction_loss"] = 100 + 0 * time  # is in the total already
+    run = run_of(
+        time,
+        np.sin(2 * np.pi * time),
+        current=3 + 4 * math.sqrt(2) * np.sin(2 * np.pi * time),
+        losses={"copper_loss": 2 + np.sin(2 * np.pi * time), "friction_loss": 0.5 + 0 * time},
+        gear_loss=100 + 0 * time,  # of one bearing, which the total has already: it does not have the role
+    )
     found = classify(run).duty
     assert found.current_rms == pytest.approx(5.0, rel=1e-3)
     assert found.mean_loss == pytest.approx(2.5, rel=1e-3)

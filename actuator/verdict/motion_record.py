@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator.simulation.run import Run
+from gear.quantities.roles import ControllerMemory, Heat, Resolution, SensorOf
 
 STILL = 1e-9  # rad; less motion than this is none
 SAME = 0.02  # relative difference up to which two swings or two periods of a run are the same
 GROWTH = 2.0  # factor over the observed time that is growth, and its inverse decay
 QUARTERS = 4  # of the time: a drift is a motion in the last that is no smaller than in the one before
-LOSS = "_loss"  # end of the names of outputs that are heat
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +58,7 @@ class MotionRecord:
 def record_motion(run: Run, since: float | None = None) -> MotionRecord:
     """The record of a run from a time [s] on; None for the time of the last change of an input."""
     keep = run.t >= (_inputs_settled(run) if since is None else since)
-    losses = [values[keep] for name, values in run.signals.items() if name.endswith(LOSS) and "." not in name]
+    losses = [run[quantity.name][keep] for quantity in run.system.signals_having(Heat)]
 
     def part(name: str) -> np.ndarray | None:
         return run[name][keep] if name in run.signals else None
@@ -96,18 +96,16 @@ def _inputs_settled(run: Run) -> float:
 
 def _resolution(run: Run) -> float:
     """Of the position that a sampled controller sees [rad at the load]."""
-    values = {q.name: float(value) for q, value in zip(_listed(run, "parameters"), run.parameters, strict=False)}
-    at_load = values.get("sensors.load.resolution", 0.0)
-    at_motor = values.get("sensors.motor.resolution", 0.0)
-    if not _listed(run, "clocks") or not (at_load or at_motor) or "motor_angle_at_load" not in run.signals:
+    found = {"load": 0.0, "motor": 0.0}
+    for parameter, value in zip(run.system.parameters, run.parameters, strict=True):
+        sensor = parameter.role(SensorOf)
+        if parameter.role(Resolution) is not None and sensor is not None and sensor.reads in found:
+            found[sensor.reads] = float(value)
+    if not run.system.clocks or not any(found.values()) or "motor_angle_at_load" not in run.signals:
         return 0.0
     far = int(np.argmax(abs(run["motor_angle_at_load"])))
     turns = abs(run["motor_angle"][far] / run["motor_angle_at_load"][far]) if run["motor_angle_at_load"][far] else 1.0
-    return max(at_load, at_motor / turns)
-
-
-def _listed(run: Run, name: str) -> tuple:
-    return getattr(run.system, name, ())
+    return max(found["load"], found["motor"] / turns)
 
 
 def _drift(run: Run, keep: np.ndarray) -> tuple[str, float]:
@@ -115,7 +113,7 @@ def _drift(run: Run, keep: np.ndarray) -> tuple[str, float]:
     if keep.sum() < QUARTERS:
         return "", float("nan")
     for quantity in run.system.states:
-        if quantity.name.startswith("controller."):
+        if quantity.role(ControllerMemory) is not None:
             before, after = measure_swings(run[quantity.name][keep], QUARTERS)[2:]
             if after > max(STILL * quantity.nominal, before / GROWTH):
                 drifts = f"{quantity.name} still drifts: it changed by {after:.3g} {quantity.unit} in the last quarter"

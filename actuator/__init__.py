@@ -49,8 +49,9 @@ from actuator.parts.bridge import Bridge as Bridge
 from actuator.parts.current_source import CurrentSource as CurrentSource
 from actuator.parts.dc_link import BrakingChopper as BrakingChopper
 from actuator.parts.dc_link import DCLink as DCLink
-from actuator.parts.fold_back import OverheatFoldBack as OverheatFoldBack
-from actuator.parts.fold_back import UndervoltageFoldBack as UndervoltageFoldBack
+from actuator.parts.dc_motor import DCMotor as DCMotor
+from actuator.parts.derating import OverheatDerating as OverheatDerating
+from actuator.parts.derating import UndervoltageDerating as UndervoltageDerating
 from actuator.parts.inverter import Inverter as Inverter
 from actuator.parts.linear_load import LinearLoad as LinearLoad
 from actuator.parts.load import Gravity as Gravity
@@ -58,10 +59,9 @@ from actuator.parts.load import Load as Load
 from actuator.parts.mechanisms import Lever as Lever
 from actuator.parts.mechanisms import Rack as Rack
 from actuator.parts.mechanisms import Screw as Screw
-from actuator.parts.motor import PMSM as PMSM
-from actuator.parts.motor import DCMotor as DCMotor
-from actuator.parts.motor import TorqueSource as TorqueSource
+from actuator.parts.motor import Motor as Motor
 from actuator.parts.noise import WhiteNoise as WhiteNoise
+from actuator.parts.pmsm import PMSM as PMSM
 from actuator.parts.rotor import Cogging as Cogging
 from actuator.parts.rotor import Rotor as Rotor
 from actuator.parts.rotor import RotorDrag as RotorDrag
@@ -74,6 +74,7 @@ from actuator.parts.temperature import TemperatureDependence as TemperatureDepen
 from actuator.parts.thermal import ThermalNetwork as ThermalNetwork
 from actuator.parts.thermal import ThermalNode as ThermalNode
 from actuator.parts.thermal import ThermalPath as ThermalPath
+from actuator.parts.torque_source import TorqueSource as TorqueSource
 from actuator.parts.torque_speed import TorqueSpeedCurve as TorqueSpeedCurve
 from actuator.parts.torque_speed import torque_speed_curve as torque_speed_curve
 from actuator.response.bench.free_play import BackDriving as BackDriving
@@ -143,6 +144,8 @@ FORMER: dict[str, str] = {  # until 0.3
     "predicted_cycles": "predict_cycles",
     "rest": "predict_breakaway",
     "rest_set": "find_equilibrium_set",
+    "OverheatFoldBack": "OverheatDerating",
+    "UndervoltageFoldBack": "UndervoltageDerating",
 }
 __getattr__ = _renamed(__name__, FORMER)
 __version__ = "0.2.0"

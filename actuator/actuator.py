@@ -8,28 +8,26 @@ from typing import Any
 
 import casadi as ca
 
-from actuator.parts.current_source import CurrentSource
 from actuator.parts.dc_link import DCLink
 from actuator.parts.inverter import Inverter
-from actuator.parts.linear_load import LinearLoad
-from actuator.parts.load import Load
-from actuator.parts.motor import PMSM, DCMotor, TorqueSource
+from actuator.parts.load import Load, OutputLoad
+from actuator.parts.motor import Motor
 from actuator.parts.sensors import Sensors
 from actuator.parts.thermal import ThermalNetwork
 from actuator.system.builder import SystemBuilder
-from actuator.system.compatibility import require_fitting
+from actuator.system.compatibility import require_compatible
 from actuator.system.contacts import ContactMechanics
-from actuator.system.drive import ANGLE, Motion, Site, cascade_drive, loops_of, open_drive, pid_drive
+from actuator.system.drive import DriveContext, build_loops
 from actuator.system.heat import HeatFlow
 from actuator.system.hybrid import Clock, HybridSystem
 from actuator.system.outputs import Mechanics, observe
 from actuator.system.parameters import Parameter, parameterize, with_values
-from controllers.cascade import Cascade
-from controllers.pid import PID
-from controllers.sampling import LOOPS, Sampling
+from controllers.controller import Controller, PlantMotion
+from controllers.sampling import Sampling
 from gear.quantities.roles import Heat, ShaftAngle, ShaftSpeed
 from gear.transmission import Transmission
 
+ANGLE = 1e-4  # rad, a usual size; an angle is fine when the deflection of teeth is
 SPEED = 0.1  # rad/s, a usual size
 PARTS = ("controller", "sampling", "sensors", "link", "inverter", "motor", "thermal", "gear", "load")
 SAME_RATIO = 1e-9
@@ -56,19 +54,20 @@ class Actuator:
 
     Parameters
     ----------
-    motor : TorqueSource, CurrentSource, DCMotor or PMSM
-        TorqueSource with a PID, a Cascade without current loop, or no controller; CurrentSource with a Cascade without
-        current loop; the others with an inverter and a Cascade.
+    motor : Motor
+        Driven by torque (TorqueSource), with a PID, a Cascade without current loop, or no controller; by current
+        (CurrentSource), with a Cascade without current loop; by voltage (DCMotor, PMSM), with an inverter and a
+        controller that has a current loop.
     gear : Transmission
         From the motor shaft (input) to the load shaft (output).
-    load : Load or LinearLoad
+    load : OutputLoad
         On the output shaft.
     inverter : Inverter or None
-        For DCMotor and PMSM.
+        For a motor that is driven by voltage.
     link : DCLink or None
         The voltage of the inverter as a state; None for a constant one.
-    controller : PID, Cascade or None
-        Position controller, or with a Cascade that has no position law the speed controller.
+    controller : Controller or None
+        PID, Cascade, StateFeedback or another: of the position, or, of a Cascade without position law, of the speed.
     sampling : Sampling or None
         Periods at which the loops of the controller run; None in continuous time, for design.
     sensors : Sensors
@@ -84,19 +83,19 @@ class Actuator:
         Where the parts do not go together.
     """
 
-    motor: TorqueSource | CurrentSource | DCMotor | PMSM
+    motor: Motor
     gear: Transmission
-    load: Load | LinearLoad = field(default_factory=Load)
+    load: OutputLoad = field(default_factory=Load)
     inverter: Inverter | None = None
     link: DCLink | None = None
-    controller: PID | Cascade | None = None
+    controller: Controller | None = None
     sampling: Sampling | None = None
     sensors: Sensors = field(default_factory=Sensors)
     thermal: ThermalNetwork | None = None
     name: str = "actuator"
 
     def __post_init__(self) -> None:
-        require_fitting(self)
+        require_compatible(self)
 
     def system(self) -> HybridSystem:
         """The actuator as a HybridSystem, every number a named parameter."""
@@ -139,7 +138,7 @@ class _Assembly:
             {shaft: ca.SX.sym(f"{shaft}.{what}") for shaft in kinematics.independent} for what in ("angle", "speed")
         ]
         angle, speed = (kinematics.expand(known) for known in symbols)
-        motion = Motion(
+        motion = PlantMotion(
             motor_angle=angle[gear.input],
             motor_speed=speed[gear.input],
             load_angle=angle[gear.output],
@@ -147,22 +146,22 @@ class _Assembly:
             ratio=actuator.gear.ratio(),
         )
         inertia = {name: shaft.inertia for name, shaft in gear.shafts.items()}
-        inertia[gear.input] += getattr(parts["motor"], "inertia", 0)
+        inertia[gear.input] += parts["motor"].rotor_inertia()
         inertia[gear.output] += parts["load"].inertia_at(motion.load_angle)
         contacts = ContactMechanics(gear, actuator.gear.redundant(), kinematics, inertia)
 
-        loops, due = loops_of(book, parts["sampling"], actuator.sampling)
-        site = Site(
-            book=book,
+        names = () if actuator.controller is None else actuator.controller.loops()
+        loops, due = build_loops(book, names, parts["sampling"], actuator.sampling)
+        context = DriveContext(
+            builder=book,
             parts=parts,
             motion=motion,
             loops=loops,
             temperature=heat.of_motor(),
-            oil=heat.of_oil(),
+            oil_or_housing=heat.of_oil(),
         )
-        drive = {PID: pid_drive, Cascade: cascade_drive}.get(type(parts["controller"]), open_drive)
         torque = dict.fromkeys(gear.shafts, ca.SX(0))
-        motor_torque, load_torque = drive(site), self._load_torque(book, parts["load"], motion)
+        motor_torque, load_torque = context.drive(), self._load_torque(book, parts["load"], motion)
         torque[gear.input] += motor_torque
         torque[gear.output] += load_torque
         book.output("motor_torque", "N m", motor_torque)
@@ -181,10 +180,10 @@ class _Assembly:
                 book.rate(symbol.name(), rates[shaft])
         seen = Mechanics(contacts, forces, modes, angle, speed, torque)
         observe(book, seen, motion)
-        site.losses.update(seen.losses())
-        for name, loss in site.losses.items():
+        context.losses.update(seen.losses())
+        for name, loss in context.losses.items():
             book.output(f"{name}_loss", "W", loss, Heat(name))
-        heat.feed(site.losses)
+        heat.feed(context.losses)
 
         arguments = [book.x(), m, book.u(), ca.vertcat(*(parameter.symbol for parameter in parameters))]
         fired = ca.SX.sym("fired", len(contacts.events()))
@@ -211,15 +210,14 @@ class _Assembly:
             begin=book.begin(arguments[3]),
         )
 
-    def _load_torque(self, book: SystemBuilder, load: Any, motion: Motion) -> ca.SX:
+    def _load_torque(self, book: SystemBuilder, load: Any, motion: PlantMotion) -> ca.SX:
         """Of the load itself and from outside, as a torque on the output shaft."""
         at, outside = (motion.load_angle, motion.load_speed), book.input("load_torque", "N m")
-        force = (book.input("load_force", "N"),) if isinstance(load, LinearLoad) else ()
-        if isinstance(load, LinearLoad):
-            book.output("rod_position", "m", load.position(motion.load_angle))
-            book.output("rod_speed", "m/s", load.speed(*at))
-        book.output("load_power", "W", load.power(*at, *force) - outside * motion.load_speed)
-        return load.torque(*at, *force) + outside
+        own = () if load.own_input is None else (book.input(*load.own_input),)
+        for name, (unit, value) in load.signals(*at).items():
+            book.output(name, unit, value)
+        book.output("load_power", "W", load.power(*at, *own) - outside * motion.load_speed)
+        return load.torque(*at, *own) + outside
 
 
 def _whole_reset(settle: ca.Function, arguments: list[ca.SX], states: list[str], speeds: list[ca.SX]) -> ca.Function:
@@ -234,7 +232,7 @@ def _clocks(sampling: Sampling | None) -> tuple[Clock, ...]:
     """One per loop that has a period, the fastest first."""
     if sampling is None:
         return ()
-    return tuple(Clock(name, sampling.every(name)) for name in LOOPS if getattr(sampling, name) is not None)
+    return tuple(Clock(name, sampling.every(name)) for name in sampling.loops())
 
 
 def _check_values(actuator: Actuator, values: Mapping[str, float]) -> None:

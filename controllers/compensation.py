@@ -11,7 +11,7 @@ import casadi as ca
 
 from controllers.memory import Memory
 from controllers.shapes import direction
-from controllers.units import ErrorBand, ErrorWidth, Frequency, Level, Limit, Speed, Time
+from controllers.units import Amplitude, ErrorBand, ErrorWidth, Frequency, Level, Speed, Time
 from gear.quantities import Scalar, check, check_choice
 from gear.quantities.roles import Breakaway, Compensates
 
@@ -76,7 +76,7 @@ class Dither:
         Of the oscillation.
     """
 
-    amplitude: Limit
+    amplitude: Amplitude
     frequency: Frequency
     shape: Shape = "sine"
 
@@ -139,7 +139,7 @@ class Knocker:
     897-904.
     """
 
-    amplitude: Limit
+    amplitude: Amplitude
     width: Time
     interval: Time
     dead_band: ErrorBand = 0.0

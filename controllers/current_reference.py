@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from controllers.shapes import limited
+from controllers.shapes import saturate
 from controllers.units import FluxLinkage, Inductance
 from gear.quantities import Scalar, check
 
@@ -115,7 +115,7 @@ class CurrentReference:
         """
         voltage_limit = ca.fmax(voltage_limit, LEAST_VOLTAGE)
         limit_d, limit_q = self.largest(current_limit)
-        torque = limited(torque, self.torque(limit_d, limit_q))
+        torque = saturate(torque, self.torque(limit_d, limit_q))
         direct, quadrature = self.least(torque)
         most = FAR_INSIDE * (self.flux + (self.inductance_d + self.inductance_q) * current_limit)
         flux_limit = voltage_limit / ca.fmax(self.pole_pairs * ca.fabs(speed), voltage_limit / most)
@@ -133,7 +133,7 @@ class CurrentReference:
         magnet = self.flux / self.inductance_d
         reluctance = flux_limit * (1 / self.inductance_q - 1 / self.inductance_d)
         cosine = ca.fmax(_pull_out(magnet, reluctance), self._at_current_limit(flux_limit, current_limit))
-        end = ca.acos(limited(cosine, BELOW_ONE))
+        end = ca.acos(saturate(cosine, BELOW_ONE))
         # the torque is `scale` times f(a) = sin(a) (magnet + reluctance cos(a)), rising through `wanted` up to the end
         scale = 1.5 * self.pole_pairs * flux_limit
         wanted = ca.fmin(ca.fabs(torque) / scale, ca.sin(end) * (magnet + reluctance * ca.cos(end)))

@@ -15,12 +15,14 @@ K. J. Astrom, B. Wittenmark, "Computer-Controlled Systems" (1997), section 8.2.
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import casadi as ca
 
 from controllers.memory import Memory
 from controllers.units import DampingRatio, Frequency, ShareBelowOne
 from gear.quantities import Scalar, check, is_number
+from gear.quantities.registry import part
 
 
 def half_step(frequency: Scalar, period: Scalar) -> Scalar:
@@ -39,6 +41,27 @@ def half_step(frequency: Scalar, period: Scalar) -> Scalar:
     return ca.tan(frequency * period / 2) / frequency
 
 
+class Filter(Protocol):
+    """What shapes a signal in a loop: a slot for laws with memory (see `controllers.memory`)."""
+
+    def memory(self, unit: str = "signal", nominal: float = 1.0) -> tuple[Memory, ...]:
+        """What it remembers."""
+        ...
+
+    def output(self, memory: list[Scalar], signal: Scalar, period: Scalar | None = None) -> Scalar:
+        """Filtered signal."""
+        ...
+
+    def rates(self, memory: list[Scalar], signal: Scalar) -> list[Scalar]:
+        """Continuous form."""
+        ...
+
+    def advance(self, memory: list[Scalar], signal: Scalar, period: Scalar) -> list[Scalar]:
+        """Sampled form."""
+        ...
+
+
+@part(Filter)
 @dataclass(frozen=True, kw_only=True)
 class LowPass:
     """First-order low-pass.
@@ -79,6 +102,7 @@ class LowPass:
         return [2 * self.output(memory, signal, period) - memory[0]]
 
 
+@part(Filter)
 @dataclass(frozen=True, kw_only=True)
 class LeadLag:
     """Lead (zero below pole) or lag (pole below zero) with gain 1 at low frequency.
@@ -125,6 +149,7 @@ class LeadLag:
         return [2 * self._lag(memory, signal, period) - memory[0]]
 
 
+@part(Filter)
 @dataclass(frozen=True, kw_only=True)
 class SecondOrderLowPass:
     """Second-order low-pass.
@@ -165,6 +190,7 @@ class SecondOrderLowPass:
         return [2 * x - z for x, z in zip(_resonator(self, memory, signal, period), memory, strict=True)]
 
 
+@part(Filter)
 @dataclass(frozen=True, kw_only=True)
 class Notch:
     """Notch: takes out one frequency and leaves those far from it.

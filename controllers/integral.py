@@ -128,7 +128,7 @@ def rate_of(law: Any, state: Scalar, error: Scalar, proposed: Scalar, realized: 
     return _rate(law, state, error, proposed, realized)
 
 
-def advanced(  # noqa: PLR0913 - the law, what it saw, and its period
+def advance_integral(  # noqa: PLR0913 - the law, what it saw, and its period
     law: Any,
     state: Scalar,
     error: Scalar,

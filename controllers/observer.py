@@ -4,7 +4,7 @@ All take the exact step for inputs that are held over a sample, so their poles a
 """
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Protocol
 
 import casadi as ca
 
@@ -12,6 +12,7 @@ from controllers.memory import Memory
 from controllers.shapes import closing_rate
 from controllers.units import Frequency, Inertia, Time
 from gear.quantities import Scalar, check
+from gear.quantities.registry import part
 from gear.quantities.roles import IntegralGain
 
 
@@ -62,6 +63,27 @@ class DisturbanceObserver:
         return [memory[0] - share * (self.output(memory, torque, speed, period) + torque)]
 
 
+class SpeedEstimator(Protocol):
+    """Speed of the motor from its measured angle: a slot for laws with memory (see `controllers.memory`)."""
+
+    def memory(self, unit: str = "rad", nominal: float = 1e-3) -> tuple[Memory, ...]:
+        """What it remembers."""
+        ...
+
+    def output(self, memory: list[Scalar], position: Scalar, period: Scalar | None = None) -> Scalar:
+        """Speed [rad/s]."""
+        ...
+
+    def rates(self, memory: list[Scalar], position: Scalar) -> list[Scalar]:
+        """Continuous form."""
+        ...
+
+    def advance(self, memory: list[Scalar], position: Scalar, period: Scalar) -> list[Scalar]:
+        """Sampled form."""
+        ...
+
+
+@part(SpeedEstimator)
 @dataclass(frozen=True, kw_only=True)
 class FilteredDerivative:
     """Speed from position by a derivative with one lag.
@@ -96,6 +118,7 @@ class FilteredDerivative:
         return [memory[0] + period * self.output(memory, position, period)]
 
 
+@part(SpeedEstimator)
 @dataclass(frozen=True, kw_only=True)
 class PositionObserver:
     """Speed from position by second-order tracking, without lag at constant speed.

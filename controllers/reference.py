@@ -1,14 +1,15 @@
 """References that a drive can follow: limited in rate, and in rate and acceleration."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import casadi as ca
 
 from controllers.memory import Memory
-from controllers.shapes import limited
+from controllers.shapes import saturate
 from controllers.units import SignalAcceleration, SignalRate, Time
 from gear.quantities import Scalar, check
+from gear.quantities.registry import part
 
 TINY = 1e-300  # keeps a division finite whose result is multiplied by zero
 
@@ -21,6 +22,31 @@ class Motion(NamedTuple):
     acceleration: Scalar  # [signal/s^2]
 
 
+class ReferenceLimit(Protocol):
+    """A reference that a drive can follow: a slot for laws with memory (see `controllers.memory`)."""
+
+    def memory(self, unit: str = "signal", nominal: float = 1.0) -> tuple[Memory, ...]:
+        """What it remembers."""
+        ...
+
+    def motion(self, memory: list[Scalar], signal: Scalar, period: Scalar | None = None) -> Motion:
+        """Limited signal with its derivatives."""
+        ...
+
+    def output(self, memory: list[Scalar], signal: Scalar, period: Scalar | None = None) -> Scalar:
+        """Limited signal."""
+        ...
+
+    def rates(self, memory: list[Scalar], signal: Scalar) -> list[Scalar]:
+        """Continuous form."""
+        ...
+
+    def advance(self, memory: list[Scalar], signal: Scalar, period: Scalar) -> list[Scalar]:
+        """Sampled form."""
+        ...
+
+
+@part(ReferenceLimit)
 @dataclass(frozen=True, kw_only=True)
 class RateLimit:
     """Follows its input no faster than a rate.
@@ -52,8 +78,8 @@ class RateLimit:
     def motion(self, memory: list[Scalar], signal: Scalar, period: Scalar | None = None) -> Motion:
         """Limited signal and its rate; the acceleration is left at zero."""
         if period is None:
-            return Motion(memory[0], limited((signal - memory[0]) / self.time, self.rate), 0.0)
-        step = limited(signal - memory[0], self.rate * period)
+            return Motion(memory[0], saturate((signal - memory[0]) / self.time, self.rate), 0.0)
+        step = saturate(signal - memory[0], self.rate * period)
         return Motion(memory[0] + step, step / period, 0.0)
 
     def output(self, memory: list[Scalar], signal: Scalar, period: Scalar | None = None) -> Scalar:
@@ -69,6 +95,7 @@ class RateLimit:
         return [self.motion(memory, signal, period).value]
 
 
+@part(ReferenceLimit)
 @dataclass(frozen=True, kw_only=True)
 class RateAndAccelerationLimit:
     """Follows its input within a rate and an acceleration, and stops on it without overshoot.
@@ -122,7 +149,7 @@ class RateAndAccelerationLimit:
         value, rate = memory
         if period is None:
             return Motion(value, rate, self._braking(signal - value, rate))
-        change = limited(self._stopping_rate(signal - value, period) - rate, self.acceleration * period)
+        change = saturate(self._stopping_rate(signal - value, period) - rate, self.acceleration * period)
         return Motion(value + period * (rate + change), rate + change, change / period)
 
     def output(self, memory: list[Scalar], signal: Scalar, period: Scalar | None = None) -> Scalar:
@@ -142,12 +169,12 @@ class RateAndAccelerationLimit:
     def _braking(self, distance: Scalar, rate: Scalar) -> Scalar:
         straight = self.acceleration * self.time**2
         root = ca.sqrt(self.acceleration * (2 * ca.fmax(ca.fabs(distance), straight) - straight))
-        curve = limited(distance, straight) * root / straight
+        curve = saturate(distance, straight) * root / straight
         slope = self.acceleration / root * (ca.fabs(curve) < self.rate)
-        return limited((limited(curve, self.rate) - rate) / self.time - slope * rate, self.acceleration)
+        return saturate((saturate(curve, self.rate) - rate) / self.time - slope * rate, self.acceleration)
 
     def _stopping_rate(self, distance: Scalar, period: Scalar) -> Scalar:
         step = self.acceleration * period  # of the rate in a sample
         count = ca.fmax(1, ca.ceil((ca.sqrt(1 + 8 * ca.fabs(distance) / (step * period)) - 1) / 2))
         size = ca.fabs(distance) / (count * period) + step * (count - 1) / 2
-        return limited(size, self.rate) * distance / ca.fmax(ca.fabs(distance), TINY)
+        return saturate(size, self.rate) * distance / ca.fmax(ca.fabs(distance), TINY)

@@ -62,7 +62,7 @@ class ScheduledGain:
             result = result + (self.values[k + 1] - self.values[k]) * passed / width
         return result
 
-    def applied(self, law: Any, value: Scalar) -> Any:
+    def scale(self, law: Any, value: Scalar) -> Any:
         """`law` (P, PI, PID) with all its gains times the factor, for this evaluation.
 
         The copy is not checked again, as its gains may be expressions. The integral state is an output

@@ -5,7 +5,7 @@ import casadi as ca
 from gear.quantities import Scalar
 
 
-def limited(value: Scalar, limit: Scalar | None) -> Scalar:
+def saturate(value: Scalar, limit: Scalar | None) -> Scalar:
     """`value` held within +-limit; unchanged for limit None."""
     return value if limit is None else ca.fmax(-limit, ca.fmin(limit, value))
 
@@ -23,7 +23,7 @@ def direction(value: Scalar, band: Scalar, width: Scalar) -> Scalar:
     ______________/            zero within +-band, 1 from band + width on
          -band   band
     """
-    return limited(dead_zone(value, band) / width, 1.0)
+    return saturate(dead_zone(value, band) / width, 1.0)
 
 
 def closing_rate(rate: Scalar, period: Scalar | None) -> Scalar:

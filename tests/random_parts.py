@@ -25,7 +25,7 @@ from actuator import (
     Lever,
     LinearLoad,
     Load,
-    OverheatFoldBack,
+    OverheatDerating,
     Rack,
     Rotor,
     RotorDrag,
@@ -39,7 +39,7 @@ from actuator import (
     ThermalNode,
     ThermalPath,
     TorqueSource,
-    UndervoltageFoldBack,
+    UndervoltageDerating,
     WhiteNoise,
 )
 from controllers import (
@@ -245,8 +245,8 @@ def _inverter(chance, link, thermal):
     bridge = Bridge(
         dead_time=1e-6, switching_frequency=2e4, threshold=0.5, forward_drop=chance.of(0.0, 0.8), on_resistance=0.02
     )
-    undervoltage = UndervoltageFoldBack(full=LINK - 10, none=LINK - 60) if link and chance() else None
-    overheat = OverheatFoldBack(full=300.0, none=400.0) if thermal and chance() else None
+    undervoltage = UndervoltageDerating(full=LINK - 10, none=LINK - 60) if link and chance() else None
+    overheat = OverheatDerating(full=300.0, none=400.0) if thermal and chance() else None
     return Inverter(
         dc_voltage=LINK,
         current_limit=CURRENT,
@@ -362,7 +362,7 @@ def _cascade(chance, gear, kind, sampled, warm):
             if sampled and chance(0.3)
             else None,
         ),
-        current_demand="least current" if kind == "PMSM" and chance(0.4) else "quadrature",
+        current_demand="MTPA" if kind == "PMSM" and chance(0.4) else "quadrature",
         schedule=_schedule(chance, sampled, warm),
     )
 

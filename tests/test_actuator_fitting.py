@@ -3,23 +3,26 @@
 Oracles: the rules, each broken on purpose; a drive that stands still at an angle and is told to stay there.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
+from typing import Annotated
 
 import numpy as np
 import pytest
+from annotated_types import Unit
 from test_system_energy import SALIENT, drive, gear
 
 from actuator import (
     Actuator,
     AngleSensor,
     CurrentSensor,
+    DCMotor,
     Inverter,
-    OverheatFoldBack,
+    OverheatDerating,
     Sensors,
     ThermalNetwork,
     ThermalNode,
     TorqueSource,
-    UndervoltageFoldBack,
+    UndervoltageDerating,
     WhiteNoise,
     simulate,
 )
@@ -27,6 +30,7 @@ from controllers import (
     PI,
     PID,
     Cascade,
+    Controller,
     Dither,
     FilteredDerivative,
     IntegralRemedies,
@@ -64,12 +68,12 @@ def sampled(change):
 LOOSE = Inverter(dc_voltage=270.0, current_limit=30.0)
 NONSENSE = {
     "no link to sag": (
-        part(link=None, inverter=replace(LOOSE, undervoltage=UndervoltageFoldBack(full=250.0, none=200.0))),
-        "undervoltage fold-back needs a DC link",
+        part(link=None, inverter=replace(LOOSE, undervoltage=UndervoltageDerating(full=250.0, none=200.0))),
+        "undervoltage derating needs a DC link",
     ),
     "no winding to heat": (
-        part(inverter=replace(LOOSE, overheat=OverheatFoldBack(full=350.0, none=400.0))),
-        "overheat fold-back needs a thermal network with a node winding or housing, got no network",
+        part(inverter=replace(LOOSE, overheat=OverheatDerating(full=350.0, none=400.0))),
+        "overheat derating needs a thermal network with a node winding or housing, got no network",
     ),
     "no oil to warm": (
         law(schedule=ScheduledGain(over="temperature", points=(250.0,), values=(1.0,))),
@@ -109,7 +113,7 @@ NONSENSE = {
     ),
     "sensor that nothing reads": (
         lambda a: replace(law(feedback="motor")(a), sensors=Sensors(load=AngleSensor(offset=1e-3))),
-        "sensors.load is read by nothing: it needs position feedback from the load",
+        "sensors.load is read by nothing: a Cascade reads motor; remove it",
     ),
 }
 
@@ -221,3 +225,118 @@ def test_every_sensor_has_a_noise_of_its_own():
     assert len(set(begins)) == 4
     again = replace(drive(motor=SALIENT), sampling=SAMPLED, sensors=sensors).system()
     assert np.array_equal(begins, [state.initial for state in again.states if state.name.endswith(".noise")])
+
+
+# -- parts of other classes -----------------------------------------------------------------------------
+
+MASS = Transmission(shafts={"arm": Shaft(inertia=0.1)}, input="arm", output="arm")
+
+
+class MyPID(PID):
+    """A subclass, as a user may have one."""
+
+
+class MyCascade(Cascade):
+    """Another."""
+
+
+class MySource(TorqueSource):
+    """A motor."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spring(Controller):
+    """A controller that needs no registration: torque against the deflection of the motor."""
+
+    stiffness: Annotated[float, Unit("N m/rad")] = 2.0
+
+    def loops(self):
+        return ("spring",)
+
+    def reads(self):
+        return {"motor": "the spring"}
+
+    def drive(self, plant):
+        loop = plant.loop("spring")
+        torque = plant.allow(self.stiffness * (plant.input("reference", "rad") - plant.measure("motor")), 0.0)
+        return plant.actuate(loop, loop.signal("torque_reference", "N m", torque), 0.0, 0.0)
+
+
+def replaced(kind, law):
+    return kind(**{field.name: getattr(law, field.name) for field in fields(law)})
+
+
+def test_a_subclass_works_as_its_base():
+    speed = Cascade.for_bandwidths(
+        position=10.0, speed=50.0, current=1.0, inertia=0.1, resistance=1.0, inductance=1.0, speed_limit=10.0
+    )
+    for kind, law in ((MyPID, PLAIN), (MyCascade, replace(speed, current=None))):
+        runs = [
+            simulate(
+                Actuator(motor=motor, gear=MASS, controller=controller), 0.2, inputs={"reference": 0.1}, compiled=False
+            )
+            for motor, controller in ((TorqueSource(), law), (MySource(), replaced(kind, law)))
+        ]
+        assert np.array_equal(runs[0]["load_angle"], runs[1]["load_angle"])
+        assert runs[1]["load_angle"][-1] > 0.05
+    whole = drive()
+    again = replace(whole, controller=replaced(MyCascade, whole.controller))
+    assert [state.name for state in again.system().states] == [state.name for state in whole.system().states]
+
+
+def test_a_controller_of_an_unknown_class_works_by_what_it_says_of_itself():
+    plant = Actuator(motor=TorqueSource(), gear=MASS, controller=Spring())
+    run = simulate(plant, 1.0, inputs={"reference": 0.1}, resolution=0.01, compiled=False)
+    np.testing.assert_allclose(run["load_angle"], 0.1 * (1 - np.cos(np.sqrt(20.0) * run.t)), atol=1e-6)
+
+
+def spring(**methods):
+    return type("Broken", (Spring,), methods)()
+
+
+@pytest.mark.parametrize(
+    ("parts", "text"),
+    [
+        ({"controller": object()}, r"Actuator.controller: object is no Controller: it lacks loops\(self\)"),
+        ({"motor": Shaft(inertia=1.0)}, r"Actuator.motor: Shaft is no Motor: it lacks axes"),
+        ({"load": object()}, r"Actuator.load: object is no OutputLoad: it lacks inertia_at\(self, angle"),
+        (
+            {"controller": spring(reads=lambda self: {"wind": "a sail"})},
+            r"a Broken reads 'wind' \(a sail\), which no actuator has; it may read motor, load, oil",
+        ),
+        (
+            {"controller": spring(), "sensors": Sensors(load=AngleSensor(offset=1.0))},
+            "sensors.load is read by nothing: a Broken reads motor; remove it",
+        ),
+        (
+            {"controller": spring(reads=lambda self: {"motor": "it", "oil": "a schedule"})},
+            "a schedule needs a thermal network with a node oil or housing, got no network",
+        ),
+        ({"controller": spring(commands=lambda self: ("current",))}, "TorqueSource is driven by torque, and a Broken"),
+        ({"sensors": Sensors(motor=AngleSensor(offset=1.0))}, "sensors.motor is read by nothing: there is no contr"),
+    ],
+)
+def test_what_is_unknown_unread_or_unmet_is_refused_by_name(parts, text):
+    with pytest.raises(ValueError, match=text):
+        Actuator(**{"motor": TorqueSource(), "gear": MASS} | parts)
+
+
+@pytest.mark.parametrize(
+    ("reads", "text"),
+    [
+        ({}, "a Broken takes 'motor' without declaring that it reads it"),
+        ({"motor": "it", "load": "nothing"}, r"a Broken declares that it reads 'load' \(nothing\), and does not"),
+    ],
+)
+def test_what_a_controller_declares_to_read_is_what_it_reads(reads, text):
+    plant = Actuator(motor=TorqueSource(), gear=MASS, controller=spring(reads=lambda self: reads))
+    with pytest.raises(ValueError, match=text):
+        plant.system()
+
+
+def test_the_former_name_of_a_current_demand_is_refused_with_the_new_one():
+    with pytest.raises(ValueError, match='Cascade.current_demand "least current" is now called "MTPA"'):
+        law(current_demand="least current")(drive())
+    with pytest.raises(ValueError, match='current_demand "MTPA" is for a motor with two axes, not for a DCMotor'):
+        dc = DCMotor(resistance=1.0, inductance=1e-3, torque_constant=0.05, inertia=1e-5)
+        law(current_demand="MTPA")(replace(drive(), motor=dc))

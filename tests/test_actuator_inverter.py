@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 from actuator.parts.bridge import Bridge
 from actuator.parts.dc_link import BrakingChopper, DCLink
-from actuator.parts.fold_back import OverheatFoldBack, UndervoltageFoldBack
+from actuator.parts.derating import OverheatDerating, UndervoltageDerating
 from actuator.parts.inverter import Inverter
 from actuator.parts.park import to_axes, to_phases
 from actuator.parts.pmsm import PMSM
@@ -29,8 +29,8 @@ BRIDGE = Bridge(dead_time=2e-6, switching_frequency=10e3, threshold=0.5, forward
 REAL = replace(CIRCLE, bridge=BRIDGE)
 FOLDING = replace(
     CIRCLE,
-    undervoltage=UndervoltageFoldBack(full=250.0, none=200.0),
-    overheat=OverheatFoldBack(full=390.0, none=420.0),
+    undervoltage=UndervoltageDerating(full=250.0, none=200.0),
+    overheat=OverheatDerating(full=390.0, none=420.0),
 )
 EVERYTHING = replace(FOLDING, limit="hexagon", bridge=BRIDGE)
 
@@ -300,10 +300,10 @@ def test_links_are_the_same_in_numbers_and_in_symbols():
         ),
         (lambda: replace(BRIDGE, threshold=0.0), "Bridge.threshold must be > 0 A, got 0 A"),
         (
-            lambda: UndervoltageFoldBack(full=200.0, none=250.0),
-            "UndervoltageFoldBack.none must be < 200 V, `full`, got 250 V",
+            lambda: UndervoltageDerating(full=200.0, none=250.0),
+            "UndervoltageDerating.none must be < 200 V, `full`, got 250 V",
         ),
-        (lambda: OverheatFoldBack(full=420.0, none=390.0), "OverheatFoldBack.none must be > 420 K, `full`, got 390 K"),
+        (lambda: OverheatDerating(full=420.0, none=390.0), "OverheatDerating.none must be > 420 K, `full`, got 390 K"),
         (
             lambda: replace(CHOPPER, full=305.0),
             "BrakingChopper.full must be > 310 V, `start`, got 305 V",

@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 from oracles import gradient_in_symbols, in_symbols, numbers
 from scipy.integrate import solve_ivp
 
-from actuator.parts.motor import PMSM, CurrentSource, DCMotor
+from actuator.parts.current_source import CurrentSource
+from actuator.parts.dc_motor import DCMotor
 from actuator.parts.park import to_axes, to_phases
+from actuator.parts.pmsm import PMSM
 from actuator.parts.rotor import Cogging, Rotor, RotorDrag
 from actuator.parts.saturation import Saturation
 from actuator.parts.temperature import COPPER, MotorTemperature, TemperatureDependence
@@ -296,10 +298,10 @@ def test_current_source_follows_with_its_lag_or_at_once():
     lagging = CurrentSource(torque_constant=2.0, inertia=1e-3, lag=1e-3, torque_limit=10.0)
     assert lagging.axes == ("current",)
     assert lagging.derivatives([1.0], 3.0) == [2.0 / 1e-3]
-    assert [lagging.allow(current) for current in (-9.0, 4.0, 6.0)] == [-5.0, 4.0, 5.0]
+    assert [lagging.allow_torque(torque) for torque in (-18.0, 8.0, 12.0)] == [-10.0, 8.0, 10.0]
     assert lagging.torque([lagging.current_for(3.0)]) == 3.0
     at_once = CurrentSource(torque_constant=2.0, inertia=1e-3)
-    assert (at_once.axes, at_once.derivatives([], 3.0), at_once.allow(1e9)) == ((), [], 1e9)
+    assert (at_once.axes, at_once.derivatives([], 3.0), at_once.allow_torque(1e9)) == ((), [], 1e9)
     dragging = replace(at_once, rotor=ROTOR)
     assert dragging.shaft_torque([1.0], 0.2, 50.0) == 2.0 + ROTOR.torque(0.2, 50.0)
 

@@ -9,9 +9,11 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from oracles import PAPER_PAIR, in_symbols, numbers
 
+from actuator.parts.dc_motor import DCMotor
 from actuator.parts.inverter import Inverter
 from actuator.parts.load import Load
-from actuator.parts.motor import PMSM, DCMotor, TorqueSource
+from actuator.parts.pmsm import PMSM
+from actuator.parts.torque_source import TorqueSource
 from actuator.simulation.signals import (
     Chirp,
     Constant,

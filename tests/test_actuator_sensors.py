@@ -11,7 +11,7 @@ from oracles import in_symbols, numbers
 from scipy import stats
 
 from actuator.parts.noise import MODULUS, WhiteNoise, following
-from actuator.parts.sensors import AngleSensor, CurrentSensor, quantized
+from actuator.parts.sensors import AngleSensor, CurrentSensor, quantize
 from actuator.system.parameters import parameterize
 
 STEP = 2 * math.pi / 4096
@@ -122,7 +122,7 @@ def test_an_encoder_says_the_nearest_count(angle):
     measured = AngleSensor.of_counts(4096).read([], angle)
     assert abs(measured - angle) <= STEP / 2 * (1 + 1e-9)
     assert measured / STEP == pytest.approx(round(measured / STEP), abs=1e-9)
-    assert quantized(angle, None) == angle
+    assert quantize(angle, None) == angle
 
 
 @settings(deadline=None, max_examples=50)

@@ -9,8 +9,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize
 
+from actuator.parts.dc_motor import DCMotor
 from actuator.parts.inverter import Inverter
-from actuator.parts.motor import PMSM, DCMotor
+from actuator.parts.pmsm import PMSM
 from actuator.parts.rotor import Rotor, RotorDrag
 from actuator.parts.saturation import Saturation
 from actuator.parts.temperature import MotorTemperature, TemperatureDependence

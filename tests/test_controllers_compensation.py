@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from oracles import in_symbols, numbers
 
-from controllers import Dither, FeedForward, FrictionCompensation, Knocker, dead_zone, direction, limited
+from controllers import Dither, FeedForward, FrictionCompensation, Knocker, dead_zone, direction, saturate
 
 FEED_FORWARD = FeedForward(inertia=2.0, viscous=0.5, coulomb=3.0, speed_share=0.8, dead_band=0.1, width=0.4)
 COMPENSATION = FrictionCompensation(coulomb=2.0, breakaway=3.0, standstill=0.1, width=0.01, dead_band=0.02)
@@ -20,10 +20,10 @@ COMPENSATION = FrictionCompensation(coulomb=2.0, breakaway=3.0, standstill=0.1, 
 @settings(deadline=None, max_examples=50)
 @given(value=numbers(-10, 10), limit=numbers(1e-3, 5))
 def test_limit_and_dead_zone_share_the_value(value, limit):
-    assert limited(value, limit) == np.clip(value, -limit, limit)
-    assert dead_zone(value, limit) + limited(value, limit) == pytest.approx(value, abs=1e-12)
+    assert saturate(value, limit) == np.clip(value, -limit, limit)
+    assert dead_zone(value, limit) + saturate(value, limit) == pytest.approx(value, abs=1e-12)
     assert dead_zone(value, limit) * (abs(value) <= limit) == 0
-    assert limited(value, None) == value
+    assert saturate(value, None) == value
 
 
 @pytest.mark.parametrize(

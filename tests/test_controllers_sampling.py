@@ -85,17 +85,17 @@ def test_one_point_is_a_constant():
 
 
 def test_a_whole_law_is_scheduled():
-    assert TABLE.applied(P(gain=3.0), 260.0) == P(gain=4.5)
-    assert TABLE.applied(PI(proportional=2.0, integral=8.0, limit=5.0), 220.0) == PI(
+    assert TABLE.scale(P(gain=3.0), 260.0) == P(gain=4.5)
+    assert TABLE.scale(PI(proportional=2.0, integral=8.0, limit=5.0), 220.0) == PI(
         proportional=4.0, integral=16.0, limit=5.0
     )
-    assert TABLE.applied(PID(proportional=2.0, integral=8.0, derivative=0.1, filter_time=0.01), 220.0) == PID(
+    assert TABLE.scale(PID(proportional=2.0, integral=8.0, derivative=0.1, filter_time=0.01), 220.0) == PID(
         proportional=4.0, integral=16.0, derivative=0.2, filter_time=0.01
     )
 
 
 def test_a_scheduled_law_is_the_same_in_symbols():
     def output(temperature: Scalar, error: Scalar) -> Scalar:
-        return TABLE.applied(PI(proportional=2.0, integral=8.0), temperature).proposed(0.1, error)
+        return TABLE.scale(PI(proportional=2.0, integral=8.0), temperature).proposed(0.1, error)
 
     assert in_symbols(output, 240.0, 0.3) == pytest.approx(output(240.0, 0.3)) == pytest.approx(0.1 + 3.5 * 0.3)

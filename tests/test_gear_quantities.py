@@ -22,7 +22,7 @@ PARTS_OF_AN_ACTUATOR = (
     "actuator.parts.current_source",
     "actuator.parts.dc_link",
     "actuator.parts.dc_motor",
-    "actuator.parts.fold_back",
+    "actuator.parts.derating",
     "actuator.parts.inverter",
     "actuator.parts.load",
     "actuator.parts.noise",

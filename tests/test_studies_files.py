@@ -9,7 +9,7 @@ import pytest
 from actuator.actuator import Actuator
 from actuator.parts.inverter import Inverter
 from actuator.parts.load import Load
-from actuator.parts.motor import PMSM
+from actuator.parts.pmsm import PMSM
 from actuator.simulation.signals import Chirp, Constant, Ramp, Sine, Step, Sum, Table
 from controllers import PID, Cascade, P
 from gear import Backlash, Bearing, Coulomb, ExternalPair, Linear, Mesh, Shaft, Transmission
@@ -393,9 +393,9 @@ WRONG = [
     ),
     ("[scenario.inputs.reference]", '[scenario.inputs."ref rence"]', 'scenario.inputs."ref rence" is not allowed'),
     # an unknown or missing type
-    ('type = "PMSM"', 'type = "PMSN"', 'motor.type = "PMSN" must be one of TorqueSource, CurrentSource, DCMotor, PMSM'),
-    ('type = "PMSM"', "type = 3", "motor.type = 3 must be one of TorqueSource, CurrentSource, DCMotor, PMSM"),
-    ('type = "PMSM"', "", "motor.type is missing; it must be one of TorqueSource, CurrentSource, DCMotor, PMSM"),
+    ('type = "PMSM"', 'type = "PMSN"', 'motor.type = "PMSN" must be one of CurrentSource, DCMotor, PMSM, TorqueSource'),
+    ('type = "PMSM"', "type = 3", "motor.type = 3 must be one of CurrentSource, DCMotor, PMSM, TorqueSource"),
+    ('type = "PMSM"', "", "motor.type is missing; it must be one of CurrentSource, DCMotor, PMSM, TorqueSource"),
     (
         'friction = { type = "Coulomb", sliding',
         'friction = { type = "Dahl", sliding',

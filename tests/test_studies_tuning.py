@@ -31,9 +31,6 @@ from studies.tuning.loops import curves_at, phase_and_delay_margin
 from studies.tuning.measures import measures, worst
 from studies.tuning.modes import corner_modes, slides_as_it_breaks_away
 from studies.tuning.plant import (
-    INTEGRAL,
-    POSITION,
-    SPEED,
     NotTunable,
     closed_form,
     dead_banded,
@@ -57,7 +54,8 @@ from studies.tuning.study import shortfalls, tune, twins_of
 DEAD_BAND = "controller.speed.remedies.dead_band"
 LOOPS = ("speed_reference", "torque_reference")
 PID_PATH = "controller."
-GAINS = (POSITION, SPEED, INTEGRAL)
+GAINS = ("controller.position.gain", "controller.speed.proportional", "controller.speed.integral")
+POSITION, SPEED, INTEGRAL = GAINS
 INPUTS = ("reference", "load_torque", "inject.speed_reference", "inject.torque_reference")
 OUTPUTS = ("load_angle", "current", "speed_reference", "torque_reference")
 FREQUENCIES = np.logspace(1, 3.5, 40)  # below, T = -1 but for rounding, and so is the difference quotient of L
@@ -606,7 +604,10 @@ def test_report(tuned, tmp_path):
 @pytest.mark.parametrize(
     ("plant", "says"),
     [
-        (lambda: replace(servo(), motor=TorqueSource(), controller=None), "takes a Cascade or a PID"),
+        (
+            lambda: replace(servo(), motor=TorqueSource(), controller=None),
+            "tuning takes the gains of a controller, and there is none",
+        ),
         (
             lambda: replace(
                 servo(), controller=replace(servo().controller, position=PI(proportional=1.0, integral=1.0))

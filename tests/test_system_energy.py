@@ -165,7 +165,7 @@ def drive(motor=SALIENT, load=SURFACE, sampling=None, **more):
         link=link,
         gear=gear(),
         load=load,
-        controller=replace(controller, current_demand="least current") if motor is SALIENT else controller,
+        controller=replace(controller, current_demand="MTPA") if motor is SALIENT else controller,
         sampling=sampling,
         **more,
     )

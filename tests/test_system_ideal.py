@@ -15,14 +15,14 @@ from actuator import (
     Cogging,
     CurrentSensor,
     Gravity,
-    OverheatFoldBack,
+    OverheatDerating,
     Rotor,
     RotorDrag,
     Sensors,
     TemperatureDependence,
     ThermalNetwork,
     ThermalNode,
-    UndervoltageFoldBack,
+    UndervoltageDerating,
     simulate,
 )
 from actuator.parts.temperature import ROOM
@@ -78,8 +78,8 @@ SWITCHED_OFF = {
     ),
     "fold-back": lambda a: inverter(
         at_room(a),
-        undervoltage=UndervoltageFoldBack(full=100.0, none=50.0),
-        overheat=OverheatFoldBack(full=400.0, none=450.0),
+        undervoltage=UndervoltageDerating(full=100.0, none=50.0),
+        overheat=OverheatDerating(full=400.0, none=450.0),
     ),
     "remedies": lambda a: controller(
         a, remedies=Remedies(compensation=FrictionCompensation(coulomb=0.0, breakaway=0.0, standstill=1.0, width=0.1))

@@ -10,7 +10,6 @@ from actuator.parts.sensors import AngleSensor, CurrentSensor, Sensors
 from actuator.simulation.run import Run
 from actuator.simulation.signals import Signal
 from actuator.verdict.verdict import REST, Hunting, classify, decide
-from controllers.cascade import Cascade, Remedies
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -162,8 +161,8 @@ def removals(plant: Actuator, parameters: Mapping[str, float] | None = None) -> 
         LIMITS: ({n: FAR * values[n] for n in LIMITED if n in values}, f"limits {FAR:g} times as far"),
     }
     found = {cause: Removal(plant, given | changed, text) for cause, (changed, text) in changes.items() if changed}
-    if plant.sampling is not None:
-        ideal = replace(plant, sampling=None, sensors=Sensors(), controller=_continuous(plant.controller))
+    if plant.sampling is not None and plant.controller is not None:
+        ideal = replace(plant, sampling=None, sensors=Sensors(), controller=plant.controller.in_continuous_time())
         found[SAMPLING] = Removal(ideal, _kept(given, ideal), "controller in continuous time, sensors ideal")
     if any(getattr(getattr(plant.sensors, name), "resolution", None) for name in ("motor", "load", "current")):
         smooth = replace(plant, sensors=_without_counts(plant.sensors))
@@ -179,21 +178,6 @@ def _without_static(values: Mapping[str, float]) -> dict[str, float]:
             if name.endswith(ending) and partner is not None and values[partner] < value:
                 found[name] = values[partner]
     return found
-
-
-def _continuous(controller: object) -> object:
-    """The same law in continuous time, without what needs samples."""
-    if isinstance(controller, Cascade):
-        laws = {name: _never_reset(getattr(controller, name)) for name in ("position", "speed")}
-        return replace(controller, remedies=replace(controller.remedies, knocker=None), **laws)
-    return _never_reset(controller)
-
-
-def _never_reset(law: object) -> object:
-    remedies = getattr(law, "remedies", None)
-    if remedies is None or isinstance(remedies, Remedies):
-        return law
-    return replace(law, remedies=replace(remedies, reset_on_reversal=False))  # pyright: ignore[reportArgumentType]
 
 
 def _without_counts(sensors: Sensors) -> Sensors:

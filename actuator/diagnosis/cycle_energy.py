@@ -1,6 +1,5 @@
 """Energy per period of a cycle: what each element gives to the mechanics, and what it takes."""
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -9,9 +8,9 @@ import numpy as np
 from actuator.actuator import Actuator
 from actuator.simulation.run import Run
 from actuator.simulation.simulate import simulate
+from actuator.system.parameters import with_values
 from actuator.verdict.verdict import classify
-from controllers.cascade import Cascade
-from controllers.pid import PI, PID
+from controllers.controller import Controller
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -104,8 +103,7 @@ def energy_per_cycle(plant: Actuator, run: Run, *, compiled: bool | None = None)
         resolution=verdict.period_s / POINTS,
         compiled=compiled,
     )
-    values = {q.name: float(value) for q, value in zip(cycle.system.parameters, cycle.parameters, strict=True)}
-    powers = {name: torque * cycle["motor_speed"] for name, torque in _torques(plant, cycle, values).items()}
+    powers = {name: torque * cycle["motor_speed"] for name, torque in _torques(plant, cycle, parameters).items()}
     powers["load"] = cycle["total_load_torque"] * cycle["load_speed"]
     losses = {name: -values for name, values in cycle.signals.items() if name.endswith(".friction_loss")}
     powers |= {
@@ -126,42 +124,11 @@ def changed_parameters(run: Run) -> dict[str, float]:
     return {q.name: float(value) for q, value in pairs if abs(value - q.default) > CHANGED * abs(q.default)}
 
 
-def _torques(plant: Actuator, cycle: Run, values: dict[str, float]) -> dict[str, np.ndarray]:
+def _torques(plant: Actuator, cycle: Run, given: dict[str, float]) -> dict[str, np.ndarray]:
     """Motor torque by the part of the control law it comes from [N m]; what is left is named by what is between."""
-    law, total = plant.controller, cycle["motor_torque"]
-    if law is None:
+    total = cycle["motor_torque"]
+    if plant.controller is None:
         return {"motor torque": total}
-    if isinstance(law, PID):
-        ratio = plant.gear.ratio()
-        found = {
-            "proportional action": _proportional(law, "controller", values, *_position(cycle)) / ratio,
-            "integral action": cycle["controller.integral"] / ratio,
-            "derivative action": -values["controller.derivative"] * _rate(cycle, values) / ratio,
-        }
-        return found | {"limits and delay": total - sum(found.values())}
-    assert isinstance(law, Cascade)
-    asked = cycle["speed_reference"]
-    error = asked - cycle["motor_speed"]
-    found = {
-        "proportional action": _proportional(law.speed, "controller.speed", values, error, asked),
-        "integral action": cycle["controller.speed.integral"],
-    }
-    return found | {"current loop, limits and additions": total - sum(found.values())}
-
-
-def _position(cycle: Run) -> tuple[np.ndarray, np.ndarray]:
-    return cycle["reference"] - cycle["position"], cycle["reference"]
-
-
-def _proportional(
-    law: PI | PID, path: str, values: dict[str, float], error: np.ndarray, reference: np.ndarray
-) -> np.ndarray:
-    weight = values.get(f"{path}.setpoint_weight", 1.0)
-    return values[f"{path}.proportional"] * (error - (1 - weight) * reference)
-
-
-def _rate(cycle: Run, values: dict[str, float]) -> np.ndarray:
-    time = values.get("controller.filter_time", math.nan)
-    if math.isnan(time):
-        return cycle["load_speed"]
-    return (cycle["position"] - cycle["controller.filtered_position"]) / time
+    law: Controller = with_values(plant.controller, "controller", given)
+    found = law.contributions(cycle.signals, plant.gear.ratio())
+    return found | {law.remainder: total - sum(found.values())}

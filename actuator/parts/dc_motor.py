@@ -1,17 +1,22 @@
 """The brushed permanent-magnet DC motor."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from actuator.parts.electrical import Inductance, Resistance, RotorInertia, TorqueConstant
+from actuator.parts.inverter import Inverter
+from actuator.parts.motor import VoltageDriven
 from actuator.parts.rotor import MotorLosses, Rotor
 from actuator.parts.temperature import MotorTemperature, TemperatureDependence
+from actuator.parts.voltage_limit import too_fast
 from gear.quantities import Scalar, check
+from gear.quantities.registry import part
 
 
+@part(VoltageDriven)
 @dataclass(frozen=True, kw_only=True)
-class DCMotor:
+class DCMotor(VoltageDriven):
     """Brushed permanent-magnet DC motor.
 
         inductance i' = v - resistance i - torque_constant w,     torque = torque_constant i
@@ -37,10 +42,27 @@ class DCMotor:
     rotor: Rotor = field(default_factory=Rotor)
     temperature_dependence: TemperatureDependence | None = None
 
-    axes = ("current",)
-
     def __post_init__(self) -> None:
         check(self)
+
+    @classmethod
+    def examples(cls) -> "tuple[DCMotor, ...]":
+        """Plain, and with all that it can have."""
+        plain = cls(resistance=1.0, inductance=1e-3, torque_constant=0.05, inertia=1e-5)
+        return (plain, replace(plain, rotor=Rotor.examples()[-1], temperature_dependence=TemperatureDependence()))
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Of the armature."""
+        return ("current",)
+
+    def rotor_inertia(self) -> Scalar:
+        """[kg m^2]."""
+        return self.inertia
+
+    def has_rotor_torque(self) -> bool:
+        """Whether the rotor has cogging or drag."""
+        return self.rotor.acts()
 
     @classmethod
     def from_data_sheet(
@@ -130,6 +152,24 @@ class DCMotor:
     def magnetic_energy(self, currents: list[Scalar]) -> Scalar:
         """Stored by the current [J]."""
         return self.inductance * currents[0] ** 2 / 2
+
+    def stored_energy(self, currents: list[Scalar], angle: Scalar) -> Scalar:
+        """Of the current and of the cogging [J]."""
+        return self.magnetic_energy(currents) + self.rotor.energy(angle)
+
+    def drag_torque(self, speed: Scalar) -> Scalar:
+        """Of the rotor, cogging averaged out [N m]."""
+        return self.rotor.drag_torque(speed)
+
+    def steady_currents(
+        self, inverter: Inverter, speed: float, *, field_weakening: bool, temperature: MotorTemperature | None
+    ) -> list[float]:
+        """I = min(current_limit, (dc_voltage - torque_constant w)/resistance); there is no field to weaken."""
+        room = inverter.dc_voltage - self.torque_constant_at(temperature) * speed
+        current = min(inverter.current_limit, room / self.resistance_at(temperature))
+        if current < -inverter.current_limit:
+            raise too_fast(speed, inverter.current_limit, f"{inverter.dc_voltage:g} V")
+        return [current]
 
     def losses(self, currents: list[Scalar], speed: Scalar, temperature: MotorTemperature | None = None) -> MotorLosses:
         """Where the motor makes heat [W]."""

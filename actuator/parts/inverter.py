@@ -2,15 +2,16 @@
 
 import math
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Annotated, Literal, get_args
 
 import casadi as ca
 
 from actuator.parts.bridge import Bridge
+from actuator.parts.derating import OverheatDerating, UndervoltageDerating
 from actuator.parts.electrical import Current, Voltage
-from actuator.parts.fold_back import OverheatFoldBack, UndervoltageFoldBack
 from actuator.parts.park import to_axes, to_phases
 from gear.quantities import Scalar, check
+from gear.quantities.roles import Limit
 
 VoltageLimit = Literal["circle", "hexagon"]
 
@@ -35,18 +36,18 @@ class Inverter:
         Of the voltage of two axes: linear modulation, or all that the link has.
     bridge : Bridge or None
         Dead time and conduction drops.
-    undervoltage : UndervoltageFoldBack or None
+    undervoltage : UndervoltageDerating or None
         Of the current limit, by the link's voltage.
-    overheat : OverheatFoldBack or None
+    overheat : OverheatDerating or None
         Of the current limit, by a temperature.
     """
 
-    dc_voltage: Voltage
-    current_limit: Current
+    dc_voltage: Annotated[Voltage, Limit()]
+    current_limit: Annotated[Current, Limit()]
     limit: VoltageLimit = "circle"
     bridge: Bridge | None = None
-    undervoltage: UndervoltageFoldBack | None = None
-    overheat: OverheatFoldBack | None = None
+    undervoltage: UndervoltageDerating | None = None
+    overheat: OverheatDerating | None = None
 
     def __post_init__(self) -> None:
         check(self)
@@ -130,7 +131,7 @@ class Inverter:
         return ca.fmax(-limit, ca.fmin(limit, current))
 
     def current_limit_at(self, dc_voltage: Scalar | None = None, temperature: Scalar | None = None) -> Scalar:
-        """Current limit [A] after fold-back; what is not given does not fold back."""
+        """Current limit [A] after derating; what is not given does not derate."""
         limit = self.current_limit
         if self.undervoltage is not None and dc_voltage is not None:
             limit = limit * self.undervoltage.share(dc_voltage)

@@ -1,16 +1,19 @@
 """A load that moves along a line, on the output shaft through a mechanism."""
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from annotated_types import Ge, Unit
 
-from actuator.parts.mechanisms import Mechanisms
+from actuator.parts.load import OutputLoad
+from actuator.parts.mechanisms import Lever, Mechanism, Screw
 from gear.quantities import Damping, Scalar, check
+from gear.quantities.registry import part
 
 
+@part(OutputLoad)
 @dataclass(frozen=True, kw_only=True)
-class LinearLoad:
+class LinearLoad(OutputLoad):
     """A rod with a mass, and force over its position and speed, moved by the output shaft through a mechanism.
 
         x = x(phi),   x' = dx/dphi,   x'' = d2x/dphi2                             travel of the mechanism
@@ -30,7 +33,7 @@ class LinearLoad:
         [N s/m].
     force : float
         On the rod at x = 0 [N], such as a weight; positive pushes it in positive direction.
-    mechanism : Rack, Screw or Lever
+    mechanism : Mechanism
         Travel of the rod over the angle of the shaft.
     """
 
@@ -38,10 +41,25 @@ class LinearLoad:
     stiffness: Annotated[float, Unit("N/m")] = 0.0
     damping: Damping = 0.0
     force: Annotated[float, Unit("N")] = 0.0
-    mechanism: Mechanisms
+    mechanism: Mechanism
+
+    own_input: ClassVar[tuple[str, str] | None] = ("load_force", "N")
 
     def __post_init__(self) -> None:
         check(self)
+
+    @classmethod
+    def examples(cls) -> "tuple[LinearLoad, ...]":
+        """On a spindle, and with all that it can have on a lever."""
+        lever = Lever(radius=0.05, angle=0.2, link=0.2, offset=0.01)
+        return (
+            cls(mass=5.0, mechanism=Screw(lead=0.005)),
+            cls(mass=2.0, stiffness=100.0, damping=10.0, force=-20.0, mechanism=lever),
+        )
+
+    def signals(self, angle: Scalar, speed: Scalar) -> dict[str, tuple[str, Scalar]]:
+        """Position and speed of the rod."""
+        return {"rod_position": ("m", self.position(angle)), "rod_speed": ("m/s", self.speed(angle, speed))}
 
     def position(self, angle: Scalar) -> Scalar:
         """Position x of the rod [m]."""

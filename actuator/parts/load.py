@@ -1,12 +1,43 @@
 """The load on the output shaft."""
 
+from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar, Protocol
 
 import casadi as ca
 from annotated_types import Ge, Unit
 
 from gear.quantities import Angle, Scalar, TorsionalDamping, check
+from gear.quantities.registry import part
+
+
+class OutputLoad(Protocol):
+    """What an actuator asks of its load.
+
+    Attributes
+    ----------
+    own_input : (str, str) or None
+        Name and unit of an input that acts on the load beside `load_torque`; its value follows angle and speed in the
+        arguments of `torque` and `power`.
+    """
+
+    own_input: ClassVar[tuple[str, str] | None] = None
+
+    @abstractmethod
+    def inertia_at(self, angle: Scalar) -> Scalar:
+        """Inertia [kg m^2] on the output shaft at an angle [rad]."""
+
+    @abstractmethod
+    def torque(self, angle: Scalar, speed: Scalar) -> Scalar:
+        """Torque on the output shaft [N m]."""
+
+    @abstractmethod
+    def power(self, angle: Scalar, speed: Scalar) -> Scalar:
+        """Taken by what acts on the load, its inertia not counted [W]."""
+
+    def signals(self, angle: Scalar, speed: Scalar) -> dict[str, tuple[str, Scalar]]:
+        """Outputs of its own: name -> unit and value."""
+        return {}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,8 +65,9 @@ class Gravity:
         return -self.moment * ca.sin(angle - self.hanging_angle)
 
 
+@part(OutputLoad, default=True)
 @dataclass(frozen=True, kw_only=True)
-class Load:
+class Load(OutputLoad):
     """What is fixed to the output shaft: inertia, and torque over position and speed.
 
         torque on the shaft = bias - stiffness * angle - damping * speed + torque of gravity
@@ -65,6 +97,12 @@ class Load:
 
     def __post_init__(self) -> None:
         check(self)
+
+    @classmethod
+    def examples(cls) -> "tuple[Load, ...]":
+        """An inertia, and all that it can have."""
+        whole = cls(inertia=0.1, stiffness=2.0, damping=0.1, bias=0.5, gravity=Gravity(moment=1.0, hanging_angle=0.3))
+        return (cls(inertia=0.1), whole)
 
     def inertia_at(self, angle: Scalar) -> Scalar:
         """Inertia [kg m^2]; the same at every angle."""

@@ -5,12 +5,13 @@ All are without losses; for the friction of a screw see `gear.teeth.screw.ScrewP
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, Protocol
 
 import casadi as ca
 from annotated_types import Unit
 
 from gear.quantities import Angle, Length, Scalar, check, show
+from gear.quantities.registry import part
 
 
 class Travel(NamedTuple):
@@ -21,6 +22,15 @@ class Travel(NamedTuple):
     curvature: Scalar  # d2x/dphi2 [m/rad^2]
 
 
+class Mechanism(Protocol):
+    """Between the output shaft and a rod."""
+
+    def travel(self, angle: Scalar) -> Travel:
+        """Travel at the angle [rad] of the shaft."""
+        ...
+
+
+@part(Mechanism)
 @dataclass(frozen=True, kw_only=True)
 class Rack:
     """A rack on a pinion: x = radius * phi.
@@ -41,6 +51,7 @@ class Rack:
         return Travel(self.radius * angle, self.radius, 0.0)
 
 
+@part(Mechanism)
 @dataclass(frozen=True, kw_only=True)
 class Screw:
     """A nut on a spindle: x = lead * phi / (2 pi).
@@ -62,6 +73,7 @@ class Screw:
         return Travel(slope * angle, slope, 0.0)
 
 
+@part(Mechanism)
 @dataclass(frozen=True, kw_only=True)
 class Lever:
     """A lever that moves a rod, through a link or a slot: the ratio depends on the angle.
@@ -114,6 +126,3 @@ class Lever:
             slope=across + y * along / root,
             curvature=-along + (y * across - along**2) / root - (y * along) ** 2 / root**3,
         )
-
-
-Mechanisms = Rack | Screw | Lever  # every mechanism, as fields of files know them

@@ -25,7 +25,7 @@ def to_axes(phases: list[Scalar], angle: Scalar) -> list[Scalar]:
     return [direct, -2 / 3 * sum(phase * ca.sin(at) for phase, at in turned)]
 
 
-def rotated(axes: list[Scalar], angle: Scalar) -> list[Scalar]:
+def rotate(axes: list[Scalar], angle: Scalar) -> list[Scalar]:
     """A vector of two axes turned ahead by an angle [rad electrical]: from rotor axes to those of the phases."""
     direct, quadrature = axes
     cosine, sine = ca.cos(angle), ca.sin(angle)

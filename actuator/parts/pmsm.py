@@ -1,18 +1,23 @@
 """The permanent-magnet synchronous motor in rotor coordinates."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from actuator.parts.electrical import FluxLinkage, Inductance, Resistance, RotorInertia
+from actuator.parts.inverter import Inverter
+from actuator.parts.motor import VoltageDriven
 from actuator.parts.rotor import MotorLosses, Rotor
 from actuator.parts.saturation import Inductances, Saturation
 from actuator.parts.temperature import MotorTemperature, TemperatureDependence
+from actuator.parts.voltage_limit import VoltageEllipse
 from gear.quantities import Scalar, check, check_count, show
+from gear.quantities.registry import part
 
 
+@part(VoltageDriven)
 @dataclass(frozen=True, kw_only=True)
-class PMSM:
+class PMSM(VoltageDriven):
     """Permanent-magnet synchronous motor in rotor coordinates, peak-value (amplitude-invariant) dq quantities.
 
         psi_d' = vd - R id + we psi_q,     psi_d = psi + Ld id        we = pole_pairs w
@@ -53,8 +58,6 @@ class PMSM:
     temperature_dependence: TemperatureDependence | None = None
     saturation: Saturation | None = None
 
-    axes = ("current_d", "current_q")
-
     def __post_init__(self) -> None:
         check(self)
         check_count(self, "pole_pairs")
@@ -68,6 +71,37 @@ class PMSM:
                         f"PMSM.saturation must leave an inductance: lost_{axis} must be < {show(own, 'H')}, "
                         f"the motor's inductance_{axis}, got {show(lost, 'H')}"
                     )
+
+    @classmethod
+    def examples(cls) -> "tuple[PMSM, ...]":
+        """Plain and salient, with all that it can have, saturated."""
+        plain = cls(pole_pairs=4, resistance=0.3, inductance_d=4e-4, inductance_q=4e-4, flux=0.0125, inertia=2e-5)
+        salient = replace(
+            plain, inductance_q=8e-4, rotor=Rotor.examples()[-1], temperature_dependence=TemperatureDependence()
+        )
+        return (plain, salient, replace(salient, saturation=Saturation(lost_q=2e-4, current_d=20.0, current_q=20.0)))
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Direct and quadrature axis."""
+        return ("current_d", "current_q")
+
+    @property
+    def frame_turns(self) -> int:
+        """The axes turn with the magnets."""
+        return self.pole_pairs
+
+    def rotor_inertia(self) -> Scalar:
+        """[kg m^2]."""
+        return self.inertia
+
+    def has_rotor_torque(self) -> bool:
+        """Whether the rotor has cogging or drag."""
+        return self.rotor.acts()
+
+    def without_saturation(self) -> "PMSM":
+        """The same motor with constant inductances."""
+        return replace(self, saturation=None)
 
     @classmethod
     def from_data_sheet(
@@ -182,6 +216,10 @@ class PMSM:
         """Current reference of each axis [A] from the torque-producing one."""
         return [0.0, current]
 
+    def constants_for_mtpa(self) -> dict[str, Scalar]:
+        """Of a motor without saturation at the reference temperature."""
+        return {name: getattr(self, name) for name in ("pole_pairs", "flux", "inductance_d", "inductance_q")}
+
     def coupling_voltages(
         self, currents: list[Scalar], speed: Scalar, temperature: MotorTemperature | None = None
     ) -> list[Scalar]:
@@ -224,6 +262,26 @@ class PMSM:
             lost_d, lost_q = self.saturation.lost_flux(direct, quadrature)
             stored += self.saturation.lost_coenergy(direct, quadrature) - direct * lost_d - quadrature * lost_q
         return 1.5 * stored
+
+    def stored_energy(self, currents: list[Scalar], angle: Scalar) -> Scalar:
+        """Of the currents and of the cogging [J]."""
+        return self.magnetic_energy(currents) + self.rotor.energy(angle)
+
+    def drag_torque(self, speed: Scalar) -> Scalar:
+        """Of the rotor, cogging averaged out [N m]."""
+        return self.rotor.drag_torque(speed)
+
+    def steady_currents(
+        self, inverter: Inverter, speed: float, *, field_weakening: bool, temperature: MotorTemperature | None
+    ) -> list[float]:
+        """Where the voltage ellipse meets the current circle, or with the direct current of the largest torque."""
+        if self.saturation is not None:
+            raise ValueError(
+                "torque_speed_curve is a closed form of constant inductances; give the motor without saturation "
+                "(motor.without_saturation())"
+            )
+        ellipse = VoltageEllipse(self, inverter, speed, temperature)
+        return ellipse.weakened() if field_weakening else ellipse.without_weakening()
 
     def losses(self, currents: list[Scalar], speed: Scalar, temperature: MotorTemperature | None = None) -> MotorLosses:
         """Where the motor makes heat [W]."""

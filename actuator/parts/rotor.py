@@ -14,11 +14,16 @@ from gear.quantities import Angle, FrictionTorque, Scalar, TorsionalDamping, che
 
 
 class MotorLosses(NamedTuple):
-    """Heat of a motor by its place [W]."""
+    """Heat of a motor by its place [W]; None for what a motor does not know."""
 
-    copper: Scalar
-    iron: Scalar
-    friction: Scalar
+    copper: Scalar | None = None
+    iron: Scalar | None = None
+    friction: Scalar | None = None
+
+    def known(self) -> dict[str, Scalar]:
+        """By the names of outputs and of heat paths."""
+        named = {"copper": self.copper, "iron": self.iron, "drag": self.friction}
+        return {name: loss for name, loss in named.items() if loss is not None}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,6 +112,16 @@ class Rotor:
 
     cogging: Cogging | None = None
     drag: RotorDrag | None = None
+
+    @classmethod
+    def examples(cls) -> "tuple[Rotor, ...]":
+        """Without anything, and with everything."""
+        drag = RotorDrag(eddy=1e-6, viscous=2e-6, windage=1e-9)
+        return (cls(), cls(cogging=Cogging(amplitude=1e-3, periods=12), drag=drag))
+
+    def acts(self) -> bool:
+        """Whether it has cogging or drag."""
+        return self.cogging is not None or self.drag is not None
 
     def torque(self, angle: Scalar, speed: Scalar) -> Scalar:
         """On the rotor [N m], at its mechanical angle and speed."""

@@ -20,7 +20,7 @@ from gear.quantities.roles import NoiseLevel, Resolution, SensorOf
 ANGLE, CURRENT = 1e-4, 1.0  # usual sizes, for the error control
 
 
-def quantized(value: Scalar, resolution: Scalar | None) -> Scalar:
+def quantize(value: Scalar, resolution: Scalar | None) -> Scalar:
     """The nearest multiple of a resolution; unchanged for None."""
     return value if resolution is None else resolution * ca.floor(value / resolution + 0.5)
 
@@ -29,7 +29,7 @@ def quantized(value: Scalar, resolution: Scalar | None) -> Scalar:
 class AngleSensor:
     """Encoder or resolver on a shaft.
 
-        measured = quantized(angle + offset + eccentricity sin(angle + eccentricity_phase) + noise), `delay` ticks late
+        measured = quantize(angle + offset + eccentricity sin(angle + eccentricity_phase) + noise), `delay` ticks late
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ class AngleSensor:
 
     def memory(self, angle: float = 0.0) -> tuple[Memory, ...]:
         """What it keeps between ticks, initially as after standing still at an angle [rad], without noise."""
-        reading = quantized(self._seen(angle), self.resolution)
+        reading = quantize(self._seen(angle), self.resolution)
         late = tuple(Memory(f"reading_{k}", "rad", ANGLE, reading) for k in range(self.delay))
         return (*_of_noise(self), *late)
 
@@ -89,14 +89,14 @@ class AngleSensor:
         return angle + self.offset + self.eccentricity * ca.sin(angle + self.eccentricity_phase)
 
     def _sample(self, memory: list[Scalar], angle: Scalar) -> Scalar:
-        return quantized(self._seen(angle) + _noise(self, memory), self.resolution)
+        return quantize(self._seen(angle) + _noise(self, memory), self.resolution)
 
 
 @dataclass(frozen=True, kw_only=True)
 class CurrentSensor:
     """Sensor of one current, of a phase or of an axis.
 
-        measured = quantized((1 + gain_error) current + offset + noise)
+        measured = quantize((1 + gain_error) current + offset + noise)
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ class CurrentSensor:
 
     def read(self, memory: list[Scalar], current: Scalar) -> Scalar:
         """Measured current [A] at this tick, from the true one."""
-        return quantized((1 + self.gain_error) * current + self.offset + _noise(self, memory), self.resolution)
+        return quantize((1 + self.gain_error) * current + self.offset + _noise(self, memory), self.resolution)
 
     def advance(self, memory: list[Scalar], current: Scalar) -> list[Scalar]:
         """Memory for the next tick."""

@@ -9,7 +9,7 @@ import numpy as np
 import xarray
 
 from actuator.actuator import Actuator
-from actuator.parts.motor import TorqueSource
+from actuator.parts.torque_source import TorqueSource
 from actuator.response.frequency_response import FrequencyResponse, frequency_response
 from actuator.system.hybrid import HybridSystem
 from gear.transmission import Bearing
@@ -29,14 +29,13 @@ def unpowered(actuator: Actuator) -> Actuator:
         Where the rotor has cogging or drag of its own, which would stay.
     """
     motor, gear = actuator.motor, actuator.gear
-    rotor = getattr(motor, "rotor", None)
-    if rotor is not None and (rotor.cogging is not None or rotor.drag is not None):
+    if motor.has_rotor_torque():
         raise ValueError(
             f"{actuator.name}: unpowered has no place for the cogging and drag of a rotor; put its drag into a bearing "
             f"of the shaft {gear.input!r}, and leave them out of the motor"
         )
     shaft = gear.shafts[gear.input]
-    heavier = replace(shaft, inertia=shaft.inertia + getattr(motor, "inertia", 0.0))
+    heavier = replace(shaft, inertia=shaft.inertia + motor.rotor_inertia())
     return Actuator(
         motor=TorqueSource(),
         gear=replace(gear, shafts={**gear.shafts, gear.input: heavier}),

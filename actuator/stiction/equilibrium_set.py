@@ -15,7 +15,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from actuator.actuator import Actuator
-from actuator.parts.motor import TorqueSource
+from actuator.parts.torque_source import TorqueSource
 from actuator.simulation.run import FREE, STUCK, contact_labels, is_at_rest
 from actuator.stiction.breakaway import NotAtRest, find_unsupported
 from actuator.system.hybrid import HybridSystem, ModeKind

@@ -184,13 +184,13 @@ class Loop:
         self.builder.output(name, unit, standing, LoopSignal(name))
         return now + self.builder.input(PREFIX + name, unit, LoopSignal(name))
 
-    def applied(self, name: str, unit: str, computed: Scalar) -> ca.SX:
+    def apply(self, name: str, unit: str, computed: Scalar) -> ca.SX:
         """A named signal that acts on the plant: held and delayed, with what is injected there."""
-        standing = self.delayed(f"controller.{name}", unit, computed, LoopSignal(name))
+        standing = self.hold_delayed(f"controller.{name}", unit, computed, LoopSignal(name))
         self.builder.output(name, unit, standing, LoopSignal(name))
         return standing + self.builder.input(PREFIX + name, unit, LoopSignal(name))
 
-    def delayed(self, name: str, unit: str, computed: Scalar, *roles: Role) -> ca.SX:
+    def hold_delayed(self, name: str, unit: str, computed: Scalar, *roles: Role) -> ca.SX:
         """A result as the plant sees it between ticks, `delay` ticks after its sample."""
         due = ca.SX(1) if self.due is None else self.due
         for k in range(self.delay):

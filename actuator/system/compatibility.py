@@ -1,25 +1,26 @@
 """Which parts of an actuator go together; each rule raises with the parts by name and what to do."""
 
-from typing import TYPE_CHECKING
+from typing import Any
 
-from actuator.parts.current_source import CurrentSource
-from actuator.parts.motor import PMSM, DCMotor
-from controllers.cascade import Cascade
-from controllers.pid import PID
-from controllers.sampling import LOOPS
+from actuator.parts.load import OutputLoad
+from actuator.parts.motor import CurrentDriven, Motor, TorqueDriven, VoltageDriven
+from actuator.system.drive import ANGLES
+from controllers.controller import Controller
 from gear.quantities import show
+from gear.quantities.registry import PartError, require_contract
 from gear.transmission import Transmission
 
-if TYPE_CHECKING:
-    from actuator.actuator import Actuator
+KINDS: dict[str, type] = {"torque": TorqueDriven, "current": CurrentDriven, "voltage": VoltageDriven}
+NODES = {"winding": ("winding", "housing"), "oil": ("oil", "housing")}  # of the thermal network, by what is asked for
+READABLE = (*ANGLES, "oil")  # by a controller
+Parts = Any  # an Actuator, which imports this file
 
-WINDING, OIL = ("winding", "housing"), ("oil", "housing")  # nodes whose temperature fold-back and schedules take
 
-
-def require_fitting(actuator: "Actuator") -> None:
+def require_compatible(actuator: Parts) -> None:
     """Raise ValueError where the parts of an actuator do not go together."""
+    _require_contracts(actuator)
     _require_drive(actuator)
-    _require_used_sensors(actuator)
+    _require_read(actuator)
     _require_temperatures(actuator)
     if actuator.sampling is None:
         _require_continuous(actuator)
@@ -27,110 +28,115 @@ def require_fitting(actuator: "Actuator") -> None:
         _require_periods(actuator)
 
 
-def _require_drive(actuator: "Actuator") -> None:
+def _require_contracts(actuator: Parts) -> None:
+    """Parts that do what is asked of one in their place, whatever class they are."""
+    _require_part("motor", actuator.motor, Motor)
+    kind = getattr(actuator.motor, "driven_by", None)
+    if kind not in KINDS:
+        raise ValueError(f"Actuator.motor: driven_by must be one of {', '.join(KINDS)}, got {kind!r}")
+    _require_part("motor", actuator.motor, KINDS[kind])
+    _require_part("load", actuator.load, OutputLoad)
+    if actuator.controller is not None:
+        _require_part("controller", actuator.controller, Controller)
+
+
+def _require_part(name: str, part: Any, slot: type) -> None:
+    try:
+        require_contract(type(part), slot)
+    except PartError as error:
+        raise ValueError(f"Actuator.{name}: {error}") from None
+
+
+def _require_drive(actuator: Parts) -> None:
     """Motor, inverter, link and controller."""
-    controller, kind = actuator.controller, type(actuator.motor).__name__
-    if isinstance(actuator.motor, DCMotor | PMSM):
-        if not (actuator.inverter and isinstance(controller, Cascade) and controller.current):
+    motor, controller, name = actuator.motor, actuator.controller, type(actuator.motor).__name__
+    control = None if controller is None else controller.current_control()
+    if motor.driven_by == "voltage":
+        if not (actuator.inverter and control):
             raise ValueError(
-                f"Actuator: a {kind} needs an inverter and a Cascade as controller, whose current loop drives it"
+                f"Actuator: a {name} needs an inverter and a Cascade as controller, whose current loop drives it, or "
+                "another controller with a current loop"
             )
-    elif actuator.inverter or actuator.link or (isinstance(controller, Cascade) and controller.current):
+    elif actuator.inverter or actuator.link or control:
+        raise ValueError(f"Actuator: a {name} has no voltage: leave inverter, link and the current loop out")
+    if controller is None and motor.driven_by != "torque":
         raise ValueError(
-            f"Actuator: a {kind} has no voltage: leave inverter, link and the current loop of a Cascade out"
+            f"Actuator: a {name} needs a controller that commands its {motor.driven_by}, such as a Cascade"
         )
-    if isinstance(actuator.motor, CurrentSource) and not isinstance(controller, Cascade):
-        raise ValueError(f"Actuator: a {kind} needs a Cascade as controller, with current = None")
-    if isinstance(controller, Cascade) and controller.current_demand != "quadrature":
-        if not isinstance(actuator.motor, PMSM):
-            raise ValueError(f'Actuator: current_demand "{controller.current_demand}" is for a PMSM, not for a {kind}')
+    if controller is not None and motor.driven_by not in controller.commands():
+        raise ValueError(
+            f"Actuator: a {name} is driven by {motor.driven_by}, and a {type(controller).__name__} commands "
+            f"{' or '.join(controller.commands())}"
+        )
+    if control is not None and control.mtpa and motor.constants_for_mtpa() is None:
+        raise ValueError(f'Actuator: current_demand "MTPA" is for a motor with two axes, not for a {name}')
     if actuator.inverter and actuator.inverter.undervoltage and actuator.link is None:
-        raise ValueError("Actuator: an undervoltage fold-back needs a DC link whose voltage falls: give it a link")
+        raise ValueError("Actuator: undervoltage derating needs a DC link whose voltage falls: give it a link")
 
 
-def _require_used_sensors(actuator: "Actuator") -> None:
-    """No sensor that nothing reads."""
+def _require_read(actuator: Parts) -> None:
+    """No sensor that nothing reads, and nothing read that no actuator has."""
     controller, sensors = actuator.controller, actuator.sensors
-    cascade = isinstance(controller, Cascade)
-    at_load = isinstance(controller, PID) or (cascade and controller.position is not None)
-    used = {
-        "motor": (cascade, "a Cascade as controller"),
-        "load": (at_load and not (cascade and controller.feedback == "motor"), "position feedback from the load"),
-        "current": (isinstance(actuator.motor, DCMotor | PMSM), "a motor with a current loop"),
-    }
-    for name, (read, need) in used.items():
-        if getattr(sensors, name) is not None and not read:
-            raise ValueError(f"Actuator.sensors.{name} is read by nothing: it needs {need}; leave it out")
+    reads = {} if controller is None else controller.reads()
+    who = "there is no controller" if controller is None else f"a {type(controller).__name__}"
+    for name, purpose in reads.items():
+        if name not in READABLE:
+            raise ValueError(
+                f"Actuator.controller: {who} reads {name!r} ({purpose}), which no actuator has; it may read "
+                f"{', '.join(READABLE)}"
+            )
+    for name in ANGLES:
+        if getattr(sensors, name) is not None and name not in reads:
+            read = who if controller is None else f"{who} reads {' and '.join(reads) or 'none'}"
+            raise ValueError(f"Actuator.sensors.{name} is read by nothing: {read}; remove it")
+    if sensors.current is not None and actuator.motor.driven_by != "voltage":
+        raise ValueError("Actuator.sensors.current is read by nothing: it needs a motor with a current loop; remove it")
 
 
-def _require_temperatures(actuator: "Actuator") -> None:
+def _require_temperatures(actuator: Parts) -> None:
     """A node for each temperature that something depends on."""
     nodes = actuator.thermal.nodes if actuator.thermal else {}
-    schedule = getattr(actuator.controller, "schedule", None)
-    asked = (
-        ("an overheat fold-back", WINDING, actuator.inverter is not None and actuator.inverter.overheat is not None),
-        ('a schedule over "temperature"', OIL, schedule is not None and schedule.over == "temperature"),
-    )
-    for what, names, present in asked:
-        if present and not any(name in nodes for name in names):
+    reads = {} if actuator.controller is None else actuator.controller.reads()
+    asked = {"oil": reads["oil"]} if "oil" in reads else {}
+    if actuator.inverter is not None and actuator.inverter.overheat is not None:
+        asked["winding"] = "overheat derating"
+    for node, purpose in asked.items():
+        if not any(name in nodes for name in NODES[node]):
             raise ValueError(
-                f"Actuator: {what} needs a thermal network with a node {' or '.join(names)}, got "
+                f"Actuator: {purpose} needs a thermal network with a node {' or '.join(NODES[node])}, got "
                 f"{', '.join(nodes) or 'no network'}"
             )
 
 
-def _require_continuous(actuator: "Actuator") -> None:
+def _require_continuous(actuator: Parts) -> None:
     """Nothing that only samples can do."""
-    controller = actuator.controller
-    for name in ("motor", "load", "current"):
-        sensor = getattr(actuator.sensors, name)
+    for name, sensor in vars(actuator.sensors).items():
         if sensor is not None and (sensor.memory() or sensor.resolution is not None):
             raise ValueError(
                 f"Actuator.sensors.{name}: resolution, noise and delay need a sampled controller: give the "
                 "actuator a sampling, or leave them out"
             )
-    parts = {"controller": controller} | {f"controller.{name}": getattr(controller, name, None) for name in LOOPS}
-    for name, law in parts.items():
-        if getattr(getattr(law, "remedies", None), "reset_on_reversal", False):
-            raise ValueError(f"Actuator.{name}: reset_on_reversal needs a sampled controller: give it a sampling")
-    if not isinstance(controller, Cascade):
-        return
-    if controller.remedies.knocker is not None:
-        raise ValueError("Actuator: a Knocker needs a sampled controller: give the actuator a sampling")
-    if controller.remedies.dither is not None and controller.remedies.dither.shape == "square":
-        raise ValueError(
-            "Actuator: the edges of a square Dither need a sampled controller: give the actuator a sampling, or the "
-            'shape "sine"'
-        )
-    if controller.schedule is not None and controller.schedule.over == "load":
-        raise ValueError(
-            'Actuator: a schedule over "load" rests on the last sample of the torque: give the actuator a sampling'
-        )
+    if actuator.controller is not None:
+        try:
+            actuator.controller.check_continuous()
+        except ValueError as error:
+            raise ValueError(f"Actuator: {error}") from None
 
 
-def _require_periods(actuator: "Actuator") -> None:
+def _require_periods(actuator: Parts) -> None:
     """A period for each loop and for no other, short enough for what runs in it."""
     controller, sampling = actuator.controller, actuator.sampling
-    assert sampling is not None
-    needed = ("position",) if isinstance(controller, PID) else ()
-    if isinstance(controller, Cascade):
-        needed = tuple(name for name in LOOPS if getattr(controller, name) is not None)
-    present = tuple(name for name in LOOPS if getattr(sampling, name) is not None)
-    if present != needed:
+    needed = () if controller is None else controller.loops()
+    if sampling.loops() != needed:
         raise ValueError(
             f"Actuator.sampling must have the periods of the loops of its controller "
-            f"({', '.join(needed) or 'there is none'}), got {', '.join(present)}"
+            f"({', '.join(needed) or 'there is none'}), got {', '.join(sampling.loops())}"
         )
-    if not isinstance(controller, Cascade) or sampling.speed is None:
-        return
-    for law in (controller.remedies.dither, controller.remedies.knocker):
-        if law is not None:
-            law.check_period(sampling.speed)
-    for name, law in controller.torque_filters.items():
+    if controller is not None:
         try:
-            law.output([0.0] * len(law.memory()), 0.0, period=sampling.speed)
+            controller.check_sampling(sampling)
         except ValueError as error:
-            raise ValueError(f"Actuator.controller.torque_filters.{name}: {error}") from None
+            raise ValueError(f"Actuator: {error}") from None
 
 
 def require_within_stops(gear: Transmission, low: float, high: float) -> None:

@@ -7,7 +7,7 @@ import casadi as ca
 
 from actuator.system.builder import SystemBuilder
 from actuator.system.contacts import ContactForces, ContactMechanics, ContactModes
-from actuator.system.drive import Motion
+from controllers.controller import PlantMotion
 from gear.quantities import Scalar
 
 
@@ -49,7 +49,7 @@ class Mechanics(NamedTuple):
         }
 
 
-def observe(book: SystemBuilder, seen: Mechanics, motion: Motion) -> None:
+def observe(book: SystemBuilder, seen: Mechanics, motion: PlantMotion) -> None:
     """Motion of motor and load, slip, friction and loss of every contact, loads of every mesh, energy."""
     contacts, forces = seen.contacts, seen.forces
     gear = contacts.gear

@@ -117,7 +117,7 @@ def drive() -> Actuator:
             speed_limit=1000.0,  # far away
             speed_from=PositionObserver(bandwidth=OBSERVER_BANDWIDTH),
             torque_filters={"reference": LowPass(frequency=REFERENCE_BANDWIDTH)},
-            current_demand="least current",
+            current_demand="MTPA",
         ),
         sampling=Sampling(current=PERIOD, speed=PERIOD, delay=1),
         name="2.2 kW drive",

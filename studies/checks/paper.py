@@ -59,6 +59,7 @@ def figure_9_inputs() -> Mapping[str, Signal]:
 
 def figure_9_start(plant: Actuator) -> Mapping[str, float]:
     """The static equilibrium of the preload without friction."""
+    assert isinstance(plant.load, Load)  # of that case
     pair, spring, stiffness = plant.gear.meshes["mesh"].pair, plant.load.stiffness, 2e8
     force = PRELOAD / (pair.radius_a * math.cos(pair.working_angle))
     angle_b = -force * pair.radius_b * math.cos(pair.working_angle) / spring

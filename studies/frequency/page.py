@@ -214,12 +214,7 @@ def _assumed(plan: Plan, studies: Sequence[Study]) -> list[str]:
         ("Averaged inverter", where(lambda study: study.case.actuator.inverter is not None)),
         (
             "Decoupling with the motor parameters given",
-            where(
-                lambda study: (
-                    getattr(study.case.actuator.controller, "current", None) is not None
-                    and getattr(study.case.actuator.controller, "decoupling", False)
-                )
-            ),
+            where(lambda study: _is_decoupled(study.case.actuator)),
         ),
         ("Controllers in continuous time", where(lambda study: study.case.actuator.sampling is None)),
         ("Controllers sampled", where(lambda study: study.case.actuator.sampling is not None)),
@@ -232,7 +227,7 @@ def _assumed(plan: Plan, studies: Sequence[Study]) -> list[str]:
         (
             "Unpowered: the winding is open",
             where(
-                lambda study: "unpowered" in study.stiffness and hasattr(study.case.actuator.motor, "resistance"),
+                lambda study: "unpowered" in study.stiffness and study.case.actuator.motor.driven_by == "voltage",
             ),
         ),
         (
@@ -337,3 +332,8 @@ def number(value: float, infinite: str = "–") -> str:
     if not math.isfinite(value):
         return infinite
     return f"{value:.4g}" if abs(value) > ROUNDING else "0"
+
+
+def _is_decoupled(actuator: Any) -> bool:
+    control = None if actuator.controller is None else actuator.controller.current_control()
+    return control is not None and control.decoupling

@@ -102,10 +102,10 @@ def largest_torque(case: Case) -> float:
         For a motor without limits.
     """
     actuator, motor = case.actuator, case.actuator.motor
-    if actuator.inverter is None or not hasattr(motor, "resistance"):
+    if actuator.inverter is None or motor.driven_by != "voltage":
         raise WrongRequest(f"{case.name}: its motor has no largest torque; give the one at the load with --torque")
-    plain = replace(motor, saturation=None) if getattr(motor, "saturation", None) else motor
-    curve = torque_speed_curve(plain, actuator.inverter, [0.0])  # pyright: ignore[reportArgumentType] - has a winding
+    plain: Any = motor.without_saturation()
+    curve = torque_speed_curve(plain, actuator.inverter, [0.0])
     return abs(actuator.gear.ratio()) * float(curve.torques[0])
 
 

@@ -9,18 +9,14 @@ from actuator.actuator import Actuator
 from actuator.linear.sampled import without_counts
 from actuator.system.builder import PREFIX
 from actuator.system.hybrid import HybridSystem
-from actuator.system.parameters import Parameter
-from controllers.cascade import Cascade
+from actuator.system.parameters import Parameter, with_values
+from controllers.controller import Controller, integrating_law, prefix_of_integral
+from controllers.countermeasures import with_integral
 from controllers.integral import IntegralRemedies
-from controllers.pid import PI, PID, P
 from studies.specification import Demand
 
-POSITION, SPEED, INTEGRAL = "controller.position.gain", "controller.speed.proportional", "controller.speed.integral"
-CASCADE_GAINS = (POSITION, SPEED, INTEGRAL)
-PID_GAINS = tuple(f"controller.{name}" for name in ("proportional", "integral", "derivative", "filter_time"))
+OWNER = "controller."  # of the gains, in the names of parameters
 ROOM = 1.5  # bandwidth of the position loop at the start, over the demanded one
-APART = 4.0  # speed bandwidth over that of the position loop, and over the rate of the integral
-ABOVE = 10.0  # rate of the derivative's filter over the bandwidth, at the start
 
 
 class NotTunable(ValueError):
@@ -36,32 +32,26 @@ class Effort(NamedTuple):
     unit: str
 
 
-def tunable(plant: Actuator) -> Cascade | PID:
+def tunable(plant: Actuator) -> Controller:
     """The controller of an actuator; NotTunable with the reason where it is not one that can be tuned here."""
     controller = plant.controller
-    if isinstance(controller, PID):
-        return controller
-    if not isinstance(controller, Cascade):
-        raise NotTunable(f"{plant.name}: tuning takes a Cascade or a PID, and there is no controller")
-    if not isinstance(controller.position, P):
-        raise NotTunable(
-            f"{plant.name}: tuning takes a Cascade with a P position law, not {type(controller.position).__name__}: "
-            "of two integrals in a row the outer one would hunt where the inner one has its dead band"
-        )
+    if controller is None:
+        raise NotTunable(f"{plant.name}: tuning takes the gains of a controller, and there is none")
+    try:
+        controller.tunable_gains()
+    except ValueError as error:
+        raise NotTunable(f"{plant.name}: {error}") from None
     return controller
 
 
 def gains_of(plant: Actuator) -> tuple[str, ...]:
     """Gains that can be tuned."""
-    controller = tunable(plant)
-    if isinstance(controller, Cascade):
-        return CASCADE_GAINS
-    return PID_GAINS if controller.filter_time is not None else PID_GAINS[:-1]
+    return tuple(f"{OWNER}{name}" for name in tunable(plant).tunable_gains())
 
 
 def dead_band_of(plant: Actuator) -> str:
     """Name of the dead band of the integral."""
-    return f"controller.{'speed.' if isinstance(tunable(plant), Cascade) else ''}remedies.dead_band"
+    return f"{prefix_of_integral(tunable(plant))}remedies.dead_band"
 
 
 def loops_of(system: HybridSystem) -> tuple[str, str]:
@@ -93,25 +83,14 @@ def inertia_at_motor(plant: Actuator) -> float:
     turns = {name: float(value) for name, value in plant.gear.travel().items()}
     own = turns[plant.gear.input]
     total = sum(shaft.inertia * (turns[name] / own) ** 2 for name, shaft in plant.gear.shafts.items())
-    return (
-        total
-        + getattr(plant.motor, "inertia", 0.0)
-        + plant.load.inertia_at(0.0) * (turns[plant.gear.output] / own) ** 2
-    )
+    return total + plant.motor.rotor_inertia() + plant.load.inertia_at(0.0) * (turns[plant.gear.output] / own) ** 2
 
 
 def closed_form(plant: Actuator, demand: Demand) -> dict[str, float]:
-    """Gains by loop shaping on the inertia that the motor turns.
-
-    Of a cascade bandwidths that are apart by a factor of four; of a PID three poles at one rate, and the filter of its
-    derivative a decade above.
-    """
-    rate, inertia = 2 * math.pi * demand.bandwidth * ROOM, inertia_at_motor(plant)
-    if isinstance(tunable(plant), Cascade):
-        law = PI.for_inertia(inertia=inertia, bandwidth=APART * rate, integral_bandwidth=rate)
-        return {POSITION: rate, SPEED: law.proportional, INTEGRAL: law.integral}
-    pid = PID.for_inertia(inertia=inertia * plant.gear.ratio() ** 2, bandwidth=rate, filter_time=1 / (ABOVE * rate))
-    return {name: getattr(pid, name.removeprefix("controller.")) for name in gains_of(plant)}
+    """Gains by loop shaping on the inertia that the motor turns."""
+    bandwidth, inertia = 2 * math.pi * demand.bandwidth * ROOM, inertia_at_motor(plant)
+    found = tunable(plant).gains_for_bandwidth(bandwidth, inertia, plant.gear.ratio())
+    return {f"{OWNER}{name}": value for name, value in found.items()}
 
 
 # -- the dead band ----------------------------------------------------------------------------------------
@@ -138,10 +117,7 @@ def dead_banded(plant: Actuator) -> Actuator:
 
 def _with_remedies(plant: Actuator, changed: Callable[[IntegralRemedies | None], IntegralRemedies | None]) -> Actuator:
     controller = tunable(plant)
-    if isinstance(controller, PID):
-        return replace(plant, controller=replace(controller, remedies=changed(controller.remedies)))
-    speed = replace(controller.speed, remedies=changed(controller.speed.remedies))
-    return replace(plant, controller=replace(controller, speed=speed))
+    return replace(plant, controller=with_integral(controller, remedies=changed(integrating_law(controller).remedies)))
 
 
 def with_dead_band(plant: Actuator, gains: Mapping[str, float], error: float) -> dict[str, float]:
@@ -149,11 +125,8 @@ def with_dead_band(plant: Actuator, gains: Mapping[str, float], error: float) ->
 
     A PID integrates the error itself, a cascade that of the motor speed [rad/s], ratio * position gain times as large.
     """
-    width = error
-    if isinstance(tunable(plant), Cascade):
-        default = defaults_of(plant.system().parameters)[POSITION]
-        width *= abs(plant.gear.ratio()) * gains.get(POSITION, default)
-    return {**gains, dead_band_of(plant): width}
+    law: Controller = with_values(tunable(plant), "controller", gains)
+    return {**gains, dead_band_of(plant): error * abs(law.error_at_integral(plant.gear.ratio()))}
 
 
 def defaults_of(parameters: tuple[Parameter, ...]) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Fold-back: less current where the supply sags or something is too hot."""
+"""Derating: less current where the supply sags or something is too hot."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ def _share(value: Scalar, none: Scalar, full: Scalar) -> Scalar:
 
 
 @dataclass(frozen=True, kw_only=True)
-class UndervoltageFoldBack:
+class UndervoltageDerating:
     """Current limit that falls with the voltage of the DC link.
 
     Parameters
@@ -30,7 +30,7 @@ class UndervoltageFoldBack:
         check(self)
         if self.none >= self.full:
             raise ValueError(
-                f"UndervoltageFoldBack.none must be < {show(self.full, 'V')}, `full`, got {show(self.none, 'V')}"
+                f"UndervoltageDerating.none must be < {show(self.full, 'V')}, `full`, got {show(self.none, 'V')}"
             )
 
     def share(self, dc_voltage: Scalar) -> Scalar:
@@ -39,7 +39,7 @@ class UndervoltageFoldBack:
 
 
 @dataclass(frozen=True, kw_only=True)
-class OverheatFoldBack:
+class OverheatDerating:
     """Current limit that falls with a temperature, usually that of the winding.
 
     Parameters
@@ -55,7 +55,7 @@ class OverheatFoldBack:
         check(self)
         if self.none <= self.full:
             raise ValueError(
-                f"OverheatFoldBack.none must be > {show(self.full, 'K')}, `full`, got {show(self.none, 'K')}"
+                f"OverheatDerating.none must be > {show(self.full, 'K')}, `full`, got {show(self.none, 'K')}"
             )
 
     def share(self, temperature: Scalar) -> Scalar:

@@ -10,7 +10,6 @@ from annotated_types import Gt, Unit
 from actuator.actuator import Actuator
 from actuator.simulation.signals import Signal
 from gear.quantities import check, require_known
-from studies.converter import SIGNALS
 from studies.files import CaseFile, built_in_files, locate, read
 from studies.structure import structure
 
@@ -121,5 +120,5 @@ def _signals(file: CaseFile, actuator: Actuator, scenario: Scenario) -> dict[str
             require_known([name], units, "input")
         except KeyError as error:
             raise file.error(steps, f"is not allowed: {error.args[0]}") from None
-        signals[name] = structure(file, steps, SIGNALS, units[name])
+        signals[name] = structure(file, steps, Signal, units[name])
     return signals

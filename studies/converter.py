@@ -10,7 +10,6 @@ from cattrs import Converter
 from cattrs.cols import is_mapping, mapping_structure_factory
 from cattrs.gen import make_dict_structure_fn
 
-from actuator.simulation.signals import Chirp, Constant, Gust, Ramp, Signal, Sine, Staircase, Step, Sum, Table
 from gear.quantities import require_known
 from gear.quantities.registry import default_part, is_slot, parts
 from studies.units import field_unit, is_number, spellings, split, to_si
@@ -18,7 +17,6 @@ from studies.units import field_unit, is_number, spellings, split, to_si
 Hook = Callable[[Any, Any], Any]
 
 TAG = "type"
-SIGNALS: Any = Constant | Step | Ramp | Sine | Chirp | Gust | Table | Staircase | Sum
 NUMBER, WHOLE, TEXT, SWITCH, LIST, TABLE = (
     "a number",
     "a whole number",
@@ -49,8 +47,6 @@ def converter(input_unit: str | None = None) -> Converter:
         (is_mapping, lambda kind: _shaped(dict, mapping_structure_factory(kind, made))),
         (_is_list, lambda kind: _shaped(list, lambda value, _: tuple(made.structure(value, list[get_args(kind)[0]])))),
         (_is_component, lambda kind: _component(kind, made, input_unit)),
-        # looked up when called, as a Sum holds signals; quoted there, and cattrs leaves it so
-        (lambda kind: kind in (Signal, "Signal"), lambda kind: lambda value, _: made.structure(value, SIGNALS)),
     ]
     for predicate, factory in factories:
         made.register_structure_hook_factory(predicate, factory)

@@ -10,12 +10,12 @@ from actuator.actuator import Actuator
 from actuator.parts.inverter import Inverter
 from actuator.parts.load import Load
 from actuator.parts.pmsm import PMSM
-from actuator.simulation.signals import Chirp, Constant, Ramp, Sine, Step, Sum, Table
+from actuator.simulation.signals import Chirp, Constant, Ramp, Signal, Sine, Step, Sum, Table
 from controllers import PID, Cascade, P
 from gear import Backlash, Bearing, Coulomb, ExternalPair, Linear, Mesh, Shaft, Transmission
 from gear.quantities import unit_of
+from gear.quantities.registry import parts
 from studies.cases import Document, built_in, load_case
-from studies.converter import SIGNALS
 from studies.files import CaseError
 from studies.units import SIGNAL_UNITS, SUFFIXES
 
@@ -307,7 +307,7 @@ def test_an_input_with_a_dot_in_its_name(load):
 
 
 def test_every_number_of_a_signal_has_a_unit():
-    names = {(kind, field.name) for kind in SIGNALS.__args__ for field in fields(kind) if kind is not Sum}
+    names = {(kind, field.name) for kind in parts(Signal).values() for field in fields(kind) if kind is not Sum}
     assert [(kind, name) for kind, name in names if unit_of(kind, name) is None and name not in SIGNAL_UNITS] == []
 
 
@@ -404,7 +404,7 @@ WRONG = [
     (
         'type = "Step"',
         'type = "Stop"',
-        'scenario.inputs.reference.type = "Stop" must be one of Constant, Step, Ramp, Sine',
+        'scenario.inputs.reference.type = "Stop" must be one of Chirp, Constant, Gust, Ramp, Sine, Staircase, Step',
     ),
     # a missing key, with its unit
     ("flux = 0.0125", "", "motor.flux is missing; it must be a number [V s]"),

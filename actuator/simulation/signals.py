@@ -9,6 +9,8 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from gear.quantities.registry import part
+
 
 class Wave(NamedTuple):
     """amplitude * sin(phase + frequency tau + rate tau^2 / 2), tau from the start of a piece."""
@@ -92,6 +94,7 @@ def bounds(signal: "Signal", end: float) -> tuple[float, float]:
     return low, high
 
 
+@part(Signal)
 @dataclass(frozen=True, kw_only=True)
 class Constant:
     """The same value for ever."""
@@ -103,6 +106,7 @@ class Constant:
         return [(-math.inf, Piece(self.value))]
 
 
+@part(Signal)
 @dataclass(frozen=True, kw_only=True)
 class Step:
     """`before` until `time` [s], `after` from then on."""
@@ -116,6 +120,7 @@ class Step:
         return [(-math.inf, Piece(self.before)), (self.time, Piece(self.after))]
 
 
+@part(Signal)
 @dataclass(frozen=True, kw_only=True)
 class Ramp:
     """`start` until `time` [s], then `slope` per second, for ever or until `end` [s]."""
@@ -137,6 +142,7 @@ class Ramp:
         return found
 
 
+@part(Signal)
 @dataclass(frozen=True, kw_only=True)
 class Sine:
     """`offset` until `time` [s], then offset + amplitude sin(2 pi frequency (t - time) + phase), frequency in Hz."""
@@ -157,6 +163,7 @@ class Sine:
         return [(-math.inf, Piece(self.offset)), (self.time, Piece(self.offset, waves=(wave,)))]
 
 
+@part(Signal)
 @dataclass(frozen=True, kw_only=True)
 class Chirp:
     """`offset` until `time` [s], then a sine whose frequency runs linearly from one value [Hz] to another."""
@@ -183,6 +190,7 @@ class Chirp:
         ]
 
 
+@part(Signal)
 @dataclass(frozen=True, kw_only=True)
 class Gust:
     """One-minus-cosine gust: `offset`, and from `time` [s] a single hump that lasts `duration` [s].
@@ -224,6 +232,7 @@ def _require_points(signal: "Table | Staircase") -> None:
         raise ValueError(f"{name}.times must increase from point to point, got {times}")
 
 
+@part(Signal)
 @dataclass(frozen=True, kw_only=True)
 class Table:
     """Straight lines through the points (times [s], values); constant before the first and after the last."""
@@ -244,6 +253,7 @@ class Table:
         return found
 
 
+@part(Signal)
 @dataclass(frozen=True, kw_only=True)
 class Staircase:
     """Each value from its time [s] until the next one, the last for ever; the first also before."""
@@ -264,6 +274,7 @@ class Staircase:
         return [(start, Piece(value)) for start, value in zip(starts, self.values, strict=True)]
 
 
+@part(Signal)
 @dataclass(frozen=True, kw_only=True)
 class Sum:
     """Several signals on one input."""

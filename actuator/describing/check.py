@@ -17,7 +17,6 @@ import numpy as np
 
 from actuator.actuator import Actuator
 from actuator.describing.describing import (
-    HARMONICS,
     TRUSTED,
     PredictedCycle,
     coulomb_friction,
@@ -86,25 +85,9 @@ class DescribingCheck:
 
     def plot(self) -> "Figure":
         """The loop and -1/N over the complex plane, and the harmonics of the orbit's load speed."""
-        from matplotlib.figure import Figure
+        from actuator.plots.orbits import plot_describing_functions
 
-        figure = Figure(figsize=(11, 4.5), layout="constrained")
-        plane, bars = figure.subplots(1, 2)
-        first = 2 * np.pi / self.orbit.period
-        loop = np.array([complex(self.loop(1j * w)) for w in first * np.geomspace(1 / REACH, REACH, 500)])
-        plane.plot(np.real(loop), np.imag(loop), label="loop, all contacts sliding")
-        plane.plot([-abs(loop).max(), 0], [0, 0], label="-1/N of the friction")
-        for cycle in self.cycles:
-            at: complex = complex(self.loop(2j * np.pi / cycle.period))
-            plane.plot([at.real], [at.imag], "o", label=f"predicted, {'stable' if cycle.stable else 'unstable'}")
-        plane.set(xlabel="real, in rad/s per N m", ylabel="imaginary", title="describing function")
-        bars.bar(np.arange(1, HARMONICS + 1), self.harmonics / self.harmonics[0])
-        bars.axhline(TRUSTED, color="k", linewidth=0.8, label="nearly a sine below")
-        bars.set(xlabel="harmonic", ylabel="over the first", title="load speed of the exact orbit")
-        for axes in (plane, bars):
-            axes.grid(alpha=0.3)
-            axes.legend(fontsize="small")
-        return figure
+        return plot_describing_functions(self)
 
 
 def check_describing_function(plant: Actuator, orbit: PeriodicOrbit) -> DescribingCheck:

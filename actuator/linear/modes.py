@@ -100,7 +100,7 @@ class ModeModels:
 
     def plot(self, at: str) -> "Figure":
         """Bode plot of the loop opened at a named signal, a line per mode in front of the envelope."""
-        from actuator.plots.linear import plot_modes
+        from actuator.plots.bode import plot_modes
 
         return plot_modes(self.loops(at), f"loop opened at {at.replace('_', ' ')}")
 

@@ -31,13 +31,9 @@ class TorqueSpeedCurve:
 
     def plot(self, ax: Any = None) -> Any:
         """Torque over speed; returns the axes."""
-        import matplotlib.pyplot as plt
+        from actuator.plots.bench import plot_torque_speed
 
-        ax = plt.subplots()[1] if ax is None else ax
-        ax.plot(self.speeds, self.torques)
-        ax.set(xlabel="motor speed [rad/s]", ylabel="torque [N m]")
-        ax.grid(visible=True)
-        return ax
+        return plot_torque_speed(self, ax)
 
 
 def torque_speed_curve(

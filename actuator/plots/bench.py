@@ -1,56 +1,23 @@
-"""Pictures of bench tests and of stiffness, drawn on figures that need no display."""
+"""Pictures of bench tests and of what a drive can do, drawn on figures that need no display."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib import colormaps
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator, MultipleLocator
+from matplotlib.ticker import MaxNLocator
 
-from actuator.linear.bode import phase_of
-from actuator.plots.response import plain_hertz
-from actuator.plots.runs import DEGREES
+from actuator.plots.style import LOAD_SPEED, PLAY, colors_over, legend_below, shown_as, words_of
 
 if TYPE_CHECKING:
+    from actuator.parts.torque_speed import TorqueSpeedCurve
     from actuator.response.bench.free_play import BackDriving, FreePlay
     from actuator.response.bench.long import RateTest, SoakTest
     from actuator.response.bench.slow import StaircaseTest, TriangleTest
     from actuator.response.bench.steps import StepTest
-    from actuator.response.stiffness import DynamicStiffness
 
-ARCMIN = 60 * DEGREES
+ANGLE = shown_as("rad")
 BEHIND = 1.15  # part of the torque that drives back, up to which is shown
-
-
-def plot_stiffness(found: "DynamicStiffness", **where: Any) -> Figure:
-    """Size and phase of the stiffness over frequency, a line per amplitude; open where it has not settled."""
-    data = found.data.sel(where).isel({name: 0 for name in ("set", "load") if name not in where})
-    figure = Figure(figsize=(9, 6.4), layout="constrained")
-    size, phase = figure.subplots(2, 1, sharex=True)
-    colors = colormaps["viridis"](np.linspace(0.05, 0.9, len(data.amplitude)))
-    for amplitude, color in zip(data.amplitude.values, colors, strict=True):
-        one = data.sel(amplitude=amplitude)
-        moves, settled, hertz = one.moves.values.astype(bool), one.settled.values.astype(bool), one.frequency.values
-        label = f"{amplitude:.3g} N m"
-        if not moves.any():
-            size.plot([], [], color=color, label=f"{label}: no motion")
-            continue
-        values = np.where(moves, one.stiffness.values, np.nan)
-        for axes, row in ((size, abs(values)), (phase, DEGREES * phase_of(values, moves))):
-            axes.plot(hertz, row, color=color, linewidth=1.2, label=label)
-            axes.plot(hertz[settled], row[settled], "o", color=color, markersize=3)
-            axes.plot(hertz[~settled], row[~settled], "o", color=color, markersize=4, mfc="w")
-    size.set(xscale="log", yscale="log", ylabel="stiffness in N m/rad")
-    plain_hertz(phase)
-    phase.set(ylabel="phase in deg", xlabel="frequency in Hz")
-    phase.yaxis.set_major_locator(MultipleLocator(45))
-    for axes in (size, phase):
-        axes.grid(alpha=0.3, which="both")
-    size.set_title("dynamic stiffness at the load; open points have not settled", fontsize="medium")
-    figure.legend(
-        *size.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize="small", frameon=False
-    )
-    return figure
 
 
 def plot_free_play(found: "FreePlay") -> Figure:
@@ -58,18 +25,18 @@ def plot_free_play(found: "FreePlay") -> Figure:
     figure = Figure(figsize=(7, 5), layout="constrained")
     axes = figure.subplots()
     middle = float(found.angle.mean())
-    axes.plot(found.torque, ARCMIN * (found.angle - middle), linewidth=1.2)
+    axes.plot(found.torque, PLAY.scale * (found.angle - middle), linewidth=1.2)
     rising = np.gradient(found.torque) > 0
     for sign in (1, -1):
         flank = (sign * found.torque > found.torque.max() / 2) & (rising == (sign > 0))
         slope, offset = np.polyfit(found.torque[flank], found.angle[flank], 1)
         ends = np.array([0.0, sign * found.torque.max()])
-        axes.plot(ends, ARCMIN * (offset + slope * ends - middle), "--", color="k", linewidth=0.8)
+        axes.plot(ends, PLAY.scale * (offset + slope * ends - middle), "--", color="k", linewidth=0.8)
     axes.axvline(0, color="k", linewidth=0.8)
     axes.set_xlabel("torque on the load in N m")
-    axes.set_ylabel("load angle in arcmin")
+    axes.set_ylabel(PLAY.label("load angle"))
     axes.set_title(
-        f"free play {ARCMIN * found.width_rad:.3g} arcmin, lost motion {ARCMIN * found.lost_motion_rad:.3g} arcmin, "
+        f"free play {PLAY.text(found.width_rad)}, lost motion {PLAY.text(found.lost_motion_rad)}, "
         f"{found.stiffness:.4g} N m/rad",
         fontsize="medium",
     )
@@ -86,14 +53,14 @@ def plot_back_driving(found: "BackDriving") -> Figure:
     # behind the onset both angles grow without bound
     shown = abs(run["load_torque"] - base) <= (np.inf if found.locks else BEHIND * abs(found.torque))
     for name in ("motor_angle_at_load", "load_angle"):
-        moved = DEGREES * (run[name] - run[name][0])[shown]
-        axes.plot(run["load_torque"][shown] - base, moved, label=name.replace("_", " "), linewidth=1.2)
+        moved = ANGLE.scale * (run[name] - run[name][0])[shown]
+        axes.plot(run["load_torque"][shown] - base, moved, label=words_of(name), linewidth=1.2)
     if not found.locks:
         axes.axvline(found.torque, color="#e1812c", linewidth=1)
     words = f"locks up to {found.highest:.4g} N m" if found.locks else f"is driven back by {found.torque:.4g} N m"
     axes.set_title(f"the motor {words}", fontsize="medium")
     axes.set_xlabel("torque on the load in N m")
-    axes.set_ylabel("angle in deg")
+    axes.set_ylabel(ANGLE.label("angle"))
     axes.grid(alpha=0.3)
     axes.legend(fontsize="small")
     return figure
@@ -107,7 +74,7 @@ def plot_steps(test: "StepTest") -> Figure:
         run = step.run
         moved = 1 + (run["load_angle"] - run["reference"][-1]) / step.size_rad
         label = (
-            f"{DEGREES * step.size_rad:.3g} deg: overshoot {step.overshoot:.0%}, rise {1e3 * step.rise_s:.0f} ms, "
+            f"{ANGLE.text(step.size_rad)}: overshoot {step.overshoot:.0%}, rise {1e3 * step.rise_s:.0f} ms, "
             f"settled {_seconds(step.settling_s)}"
         )
         axes.plot(run.t, moved, linewidth=1.2, label=label)
@@ -115,7 +82,7 @@ def plot_steps(test: "StepTest") -> Figure:
     axes.set_xlabel("time in s")
     axes.set_ylabel("load angle over step, from the old reference")
     axes.grid(alpha=0.3)
-    figure.legend(loc="outside lower center", ncols=2, fontsize="small", frameon=False)
+    legend_below(figure, axes, 2)
     return figure
 
 
@@ -128,14 +95,15 @@ def plot_triangle(test: "TriangleTest") -> Figure:
     figure = Figure(figsize=(9, 4.2), layout="constrained")
     left, right = figure.subplots(1, 2)
     run, late = test.run, test.run.t >= 0.75 * test.period_s
-    reference, load, motor = (DEGREES * run[name][late] for name in ("reference", "load_angle", "motor_angle_at_load"))
-    left.plot(reference, load, linewidth=1.0)
-    left.plot([reference.min(), reference.max()], [reference.min(), reference.max()], "k:", linewidth=0.8)
-    left.set(xlabel="reference in deg", ylabel="load angle in deg")
-    left.set_title(f"hysteresis {DEGREES * test.hysteresis_rad:.3g} deg", fontsize="medium")
-    right.plot(motor, 60 * (load - motor), linewidth=1.0)
-    right.set(xlabel="motor angle at the load in deg", ylabel="load behind motor in arcmin")
-    right.set_title(f"lost motion {ARCMIN * test.lost_motion_rad:.3g} arcmin", fontsize="medium")
+    reference, load, motor = (run[name][late] for name in ("reference", "load_angle", "motor_angle_at_load"))
+    ends = ANGLE.scale * np.array([reference.min(), reference.max()])
+    left.plot(ANGLE.scale * reference, ANGLE.scale * load, linewidth=1.0)
+    left.plot(ends, ends, "k:", linewidth=0.8)
+    left.set(xlabel=ANGLE.label("reference"), ylabel=ANGLE.label("load angle"))
+    left.set_title(f"hysteresis {ANGLE.text(test.hysteresis_rad)}", fontsize="medium")
+    right.plot(ANGLE.scale * motor, PLAY.scale * (load - motor), linewidth=1.0)
+    right.set(xlabel=ANGLE.label("motor angle at the load"), ylabel=PLAY.label("load behind motor"))
+    right.set_title(f"lost motion {PLAY.text(test.lost_motion_rad)}", fontsize="medium")
     for axes in (left, right):
         axes.xaxis.set_major_locator(MaxNLocator(5))
         axes.grid(alpha=0.3)
@@ -147,10 +115,10 @@ def plot_staircase(test: "StaircaseTest") -> Figure:
     figure = Figure(figsize=(9, 4.2), layout="constrained")
     axes = figure.subplots()
     for name, color in (("reference", "#a0a0a0"), ("load_angle", "#3b75af")):
-        axes.plot(test.run.t, DEGREES * test.run[name], color=color, linewidth=1.2, label=name.replace("_", " "))
-    axes.set(xlabel="time in s", ylabel="angle in deg")
+        axes.plot(test.run.t, ANGLE.scale * test.run[name], color=color, linewidth=1.2, label=words_of(name))
+    axes.set(xlabel="time in s", ylabel=ANGLE.label("angle"))
     found = (
-        f"{word} {DEGREES * value:.3g} deg"
+        f"{word} {ANGLE.text(value)}"
         for word, value in (("resolution", test.resolution_rad), ("threshold after the reversal", test.threshold_rad))
     )
     axes.set_title(", ".join(found), fontsize="medium")
@@ -163,15 +131,15 @@ def plot_rate(test: "RateTest") -> Figure:
     """Speed over time in the step, and over the torque on the way to the stall."""
     figure = Figure(figsize=(9, 4.2), layout="constrained")
     left, right = figure.subplots(1, 2)
-    left.plot(test.rate_run.t, DEGREES * test.rate_run["load_speed"], linewidth=1.0)
-    left.axhline(DEGREES * test.rate, color="#e1812c", linewidth=1.0)
-    left.set(xlabel="time in s", ylabel="load speed in deg/s")
-    left.set_title(f"rate {DEGREES * test.rate:.3g} deg/s", fontsize="medium")
-    right.plot(-test.stall_run["total_load_torque"], DEGREES * test.stall_run["load_speed"], linewidth=1.0)
+    left.plot(test.rate_run.t, LOAD_SPEED.scale * test.rate_run["load_speed"], linewidth=1.0)
+    left.axhline(LOAD_SPEED.scale * test.rate, color="#e1812c", linewidth=1.0)
+    left.set(xlabel="time in s", ylabel=LOAD_SPEED.label("load speed"))
+    left.set_title(f"rate {LOAD_SPEED.text(test.rate)}", fontsize="medium")
+    right.plot(-test.stall_run["total_load_torque"], LOAD_SPEED.scale * test.stall_run["load_speed"], linewidth=1.0)
     stalls = np.isfinite(test.stall_torque)
     if stalls:
         right.axvline(test.stall_torque, color="#e1812c", linewidth=1.0)
-    right.set(xlabel="torque against the motion in N m", ylabel="load speed in deg/s")
+    right.set(xlabel="torque against the motion in N m", ylabel=LOAD_SPEED.label("load speed"))
     right.set_title(f"stall at {test.stall_torque:.4g} N m" if stalls else "does not stall", fontsize="medium")
     for axes in (left, right):
         axes.grid(alpha=0.3)
@@ -182,22 +150,31 @@ def plot_soak(test: "SoakTest") -> Figure:
     """Steps at all temperatures, and the position error while holding."""
     figure = Figure(figsize=(9, 6), layout="constrained")
     upper, lower = figure.subplots(2, 1)
-    colors = colormaps["plasma"](np.linspace(0, 0.8, len(test.points)))
+    colors = colors_over(len(test.points), "plasma", 0.0, 0.8)
     for point, color in zip(test.points, colors, strict=True):
         upper.plot(
             point.step.run.t,
-            DEGREES * point.step.run["load_angle"],
+            ANGLE.scale * point.step.run["load_angle"],
             color=color,
             linewidth=1.2,
             label=f"{point.name}: {point.hold.verdict.verdict}",
         )
         run = point.hold.run
-        lower.plot(run.t, DEGREES * run["position_error"], color=color, linewidth=1.0)
-    upper.set(xlabel="time in s", ylabel="load angle in deg")
+        lower.plot(run.t, ANGLE.scale * run["position_error"], color=color, linewidth=1.0)
+    upper.set(xlabel="time in s", ylabel=ANGLE.label("load angle"))
     largest = max(float(abs(p.hold.run["position_error"][p.hold.run.t > 1]).max()) for p in test.points)
-    lower.set_ylim(-1.2 * DEGREES * largest, 1.2 * DEGREES * largest)
-    lower.set(xlabel="time in s", ylabel="position error in deg")
+    lower.set_ylim(-1.2 * ANGLE.scale * largest, 1.2 * ANGLE.scale * largest)
+    lower.set(xlabel="time in s", ylabel=ANGLE.label("position error"))
     for axes in (upper, lower):
         axes.grid(alpha=0.3)
-    figure.legend(loc="outside lower center", ncols=3, fontsize="small", frameon=False)
+    legend_below(figure, upper, 3)
     return figure
+
+
+def plot_torque_speed(curve: "TorqueSpeedCurve", ax: Axes | None = None) -> Axes:
+    """Torque over speed, on axes that are given or new ones."""
+    ax = Figure(layout="constrained").subplots() if ax is None else ax
+    ax.plot(curve.speeds, curve.torques)
+    ax.set(xlabel="motor speed in rad/s", ylabel="torque in N m")
+    ax.grid(alpha=0.3)
+    return ax

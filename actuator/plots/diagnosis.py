@@ -7,23 +7,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from actuator.verdict.verdict import DIVERGING, FAILED, HUNTING, IRREGULAR, LIMIT_CYCLE, QUANTIZER, REST, UNDECIDED
+from actuator.plots.style import CYCLE, VERDICT_COLORS
+from actuator.verdict.verdict import Verdict
 
 if TYPE_CHECKING:
     from actuator.diagnosis.causes import Causes
     from actuator.diagnosis.countermeasures import RemedyTable
     from actuator.diagnosis.cycle_energy import CycleEnergy
 
-VERDICT_COLORS = {
-    REST: "#2e8b57",
-    HUNTING: "#c0392b",
-    LIMIT_CYCLE: "#e1812c",
-    QUANTIZER: "#8e6bb0",
-    DIVERGING: "#4d4d4d",
-    IRREGULAR: "#d9b44a",
-    UNDECIDED: "#f2dfa5",
-    FAILED: "#ffffff",
-}
 GIVES, TAKES = "#c0392b", "#3b75af"
 ROW = 0.32  # inch per bar
 ROOM = 0.4  # of the longest bar, for the words behind it
@@ -59,12 +50,12 @@ def plot_causes(causes: "Causes") -> Figure:
     below = axes[-1]
     named = [("nothing removed", causes.hunting), *((f"without {c.cause}", c.hunting) for c in causes.counterfactuals)]
     for row, (_, hunting) in enumerate(named):
-        size = 1e3 * hunting.amplitude_rad if hunting.cycles else 0.0
+        size = CYCLE.scale * hunting.amplitude_rad if hunting.cycles else 0.0
         below.barh(row, size, color=VERDICT_COLORS[hunting.verdict])
         below.annotate(f" {hunting.verdict}", (size, row), va="center", fontsize="small")
     below.set_yticks(range(len(named)), [name for name, _ in named])
     below.invert_yaxis()
-    below.set_xlabel("amplitude at the load in mrad")
+    below.set_xlabel(CYCLE.label("amplitude at the load"))
     below.margins(x=0.3)
     below.set_xlim(left=0)
     below.grid(axis="x", alpha=0.3)
@@ -76,9 +67,9 @@ def plot_remedies(table: "RemedyTable") -> Figure:
     rows = [table.before, *table.ranked]
     figure = Figure(figsize=(9, 1.4 + ROW * len(rows)), layout="constrained")
     panels = figure.subplots(1, 3, sharey=True, width_ratios=[2, 1, 1])
-    colors = [VERDICT_COLORS[REST if row.forced else row.hunting.verdict] for row in rows]
+    colors = [VERDICT_COLORS[Verdict.REST if row.forced else row.hunting.verdict] for row in rows]
     columns = (
-        ("largest error in mrad", [1e3 * row.error for row in rows]),
+        (CYCLE.label("largest error"), [CYCLE.scale * row.error for row in rows]),
         ("mean loss in W", [row.hunting.duty.mean_loss for row in rows]),
         ("stiction factor", [row.stiction_factor for row in rows]),
     )

@@ -1,4 +1,4 @@
-"""Pictures of periodic orbits, drawn on figures that need no display."""
+"""Pictures of periodic orbits, of their families and of what describing functions predict; they need no display."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -6,59 +6,42 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Patch
+from matplotlib.patches import Circle
 
-from actuator.orbits.orbit import Orbit
-from actuator.plots.runs import DEGREES, LEGEND_ABOVE, MODE_COLORS, RIBBON_HEIGHT
+from actuator.describing.describing import TRUSTED
+from actuator.plots.runs import draw_signals, height_of
+from actuator.plots.style import ABOVE, shown_as
 from actuator.simulation.run import contact_labels
 from gear.quantities import require_known
 
 if TYPE_CHECKING:
     from actuator.continuation.bifurcations import Branch
+    from actuator.describing.check import DescribedHunting
+    from actuator.orbits.orbit import Orbit
+
+SPAN = 1e3  # of frequency, below and above that of the orbit, over which a loop is drawn
 
 
-def plot_orbit(orbit: Orbit, names: Sequence[str]) -> Figure:
+def plot_orbit(orbit: "Orbit", names: Sequence[str]) -> Figure:
     """Outputs over one period, a panel per unit, a ribbon of contact modes, and the multipliers in the unit circle."""
     units = {quantity.name: quantity.unit for quantity in orbit.system.outputs}
     require_known(names, units, "output")
-    by_unit: dict[str, list[str]] = {}
-    for name in names:
-        by_unit.setdefault(units[name], []).append(name)
-    contacts = list(contact_labels(orbit.system, orbit.modes))
-    ratios = [1.6] * len(by_unit) + [RIBBON_HEIGHT * len(contacts) + 0.15]
-    figure = Figure(figsize=(12, sum(ratios) + 1.2), layout="constrained")
+    signals = {name: (units[name], values) for name, values in orbit.signals(names).items()}
+    contacts: dict[str, list[tuple[float, float, str]]] = {}
+    began = 0.0
+    for segment in orbit.segments:
+        for contact, mode in contact_labels(orbit.system, segment.modes).items():
+            contacts.setdefault(contact, []).append((began, segment.duration, mode))
+        began += segment.duration
+    figure = Figure(figsize=(12, height_of(signals, contacts)), layout="constrained")
     left, right = figure.subfigures(1, 2, width_ratios=(2.6, 1))  # pyright: ignore[reportGeneralTypeIssues]
-    axes = left.subplots(len(ratios), 1, sharex=True, height_ratios=ratios, squeeze=False)[:, 0]
-    time, signals = orbit.path[0], orbit.signals(names)
-    for panel, (unit, group) in zip(axes, by_unit.items(), strict=False):
-        scale, shown = (DEGREES, "deg") if unit == "rad" else (1.0, unit)
-        for name in group:
-            panel.plot(time, scale * signals[name], label=name.replace("_", " ").replace(".", " "), linewidth=1.2)
-        panel.set_ylabel(shown)
-        panel.grid(alpha=0.3)
-        panel.legend(**LEGEND_ABOVE, ncols=len(group))
-    _ribbon(axes[-1], orbit, contacts)
-    axes[-1].set_xlabel("time in s")
-    axes[-1].set_xlim(0, orbit.period)
-    _circle(right.subplots(), orbit)
+    draw_signals(left, orbit.path[0], signals, contacts)
+    left.axes[-1].set_xlim(0, orbit.period)
+    _draw_multipliers(right.subplots(), orbit)
     return figure
 
 
-def _ribbon(axes: Axes, orbit: Orbit, contacts: Sequence[str]) -> None:
-    """One bar per contact, colored by its mode."""
-    ends = np.cumsum([segment.duration for segment in orbit.segments])
-    labels = [contact_labels(orbit.system, segment.modes) for segment in orbit.segments]
-    for row, contact in enumerate(contacts):
-        for end, segment, names in zip(ends, orbit.segments, labels, strict=True):
-            span = [(end - segment.duration, segment.duration)]
-            axes.broken_barh(span, (row - 0.4, 0.8), facecolors=MODE_COLORS[names[contact]], linewidth=0)
-    axes.set_yticks(range(len(contacts)), [name.removeprefix("gear.").replace(".", " ") for name in contacts])
-    axes.invert_yaxis()
-    patches = [Patch(color=color, label=mode) for mode, color in MODE_COLORS.items()]
-    axes.legend(handles=patches, **LEGEND_ABOVE, ncols=len(patches))
-
-
-def _circle(axes: Axes, orbit: Orbit) -> None:
+def _draw_multipliers(axes: Axes, orbit: "Orbit") -> None:
     """Floquet multipliers and the unit circle."""
     axes.add_patch(Circle((0, 0), 1, fill=False, color="k", linewidth=0.8))
     axes.plot(np.real(orbit.multipliers), np.imag(orbit.multipliers), "o", markersize=5, label="multipliers")
@@ -76,8 +59,9 @@ def plot_branch(branch: "Branch") -> Figure:
     """Amplitude, period and the largest multiplier over the parameter; unstable orbits open, the end marked."""
     figure = Figure(figsize=(8, 7), layout="constrained")
     axes = figure.subplots(3, 1, sharex=True)
+    angle = shown_as("rad")
     rows = {
-        "amplitude in deg": [DEGREES * orbit.load_amplitude for orbit in branch.orbits],
+        angle.label("amplitude"): [angle.scale * orbit.load_amplitude for orbit in branch.orbits],
         "period in s": [orbit.period for orbit in branch.orbits],
         "largest multiplier": [abs(orbit.multipliers).max() for orbit in branch.orbits],
     }
@@ -89,6 +73,27 @@ def plot_branch(branch: "Branch") -> Figure:
         panel.axvline(branch.end.value, color="#e1812c", linewidth=1.0, label=f"{branch.end.kind}")
         panel.set_ylabel(label)
         panel.grid(alpha=0.3)
-    axes[0].legend(**LEGEND_ABOVE, ncols=3)
+    axes[0].legend(**ABOVE, ncols=3)
     axes[-1].set_xlabel(branch.parameter)
+    return figure
+
+
+def plot_describing_functions(check: "DescribedHunting") -> Figure:
+    """The loop and -1/N over the complex plane, and the harmonics of the orbit's load speed."""
+    figure = Figure(figsize=(11, 4.5), layout="constrained")
+    plane, bars = figure.subplots(1, 2)
+    first = 2 * np.pi / check.orbit.period
+    loop = np.array([complex(check.loop(1j * w)) for w in first * np.geomspace(1 / SPAN, SPAN, 500)])
+    plane.plot(np.real(loop), np.imag(loop), label="loop, all contacts sliding")
+    plane.plot([-abs(loop).max(), 0], [0, 0], label="-1/N of the friction")
+    for cycle in check.cycles:
+        at: complex = complex(check.loop(2j * np.pi / cycle.period))
+        plane.plot([at.real], [at.imag], "o", label=f"predicted, {'stable' if cycle.stable else 'unstable'}")
+    plane.set(xlabel="real, in rad/s per N m", ylabel="imaginary", title="describing function")
+    bars.bar(np.arange(1, len(check.harmonics) + 1), check.harmonics / check.harmonics[0])
+    bars.axhline(TRUSTED, color="k", linewidth=0.8, label="nearly a sine below")
+    bars.set(xlabel="harmonic", ylabel="over the first", title="load speed of the exact orbit")
+    for axes in (plane, bars):
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize="small")
     return figure

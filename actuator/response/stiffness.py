@@ -96,7 +96,7 @@ class DynamicStiffness:
 
     def plot(self, **where: Any) -> "Figure":
         """Size and phase of the stiffness over frequency, a line per amplitude."""
-        from actuator.plots.bench import plot_stiffness
+        from actuator.plots.response import plot_stiffness
 
         return plot_stiffness(self, **where)
 

@@ -1,25 +1,41 @@
-"""Pictures of a frequency-response study: responses with their mask, and cases side by side."""
+"""Pictures of a frequency-response study: responses with their mask, cases side by side, what disturbs a loop."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
+import control
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from actuator import Spectrum
-from actuator.linear.bode import phase_of, to_db
-from actuator.plots.response import FAILED, READING, STILL, draw_responses, plain_hertz
+from actuator.linear.bode import to_db
+from actuator.linear.margins.sensitivity import Peak, Sensitivities
+from actuator.plots.bode import (
+    CUT,
+    bode_panels,
+    draw_bode,
+    draw_envelope,
+    finish_bode,
+    finish_frequency,
+    mode_style,
+    name_cut,
+    plot_modes,
+)
+from actuator.plots.response import FAILED, READING, STILL, draw_responses
+from actuator.plots.style import legend_below, shown_as
+from actuator.simulation.run import FREE
 from studies.frequency.corners import Place
 from studies.frequency.mask import Mask
 from studies.frequency.study import Study
 
-LIMIT_COLOR = "#c0392b"
+ANGLE = shown_as("rad")
+LIMIT_COLOR = PEAK_COLOR = "#c0392b"
 STYLES = ("-", "--", "-.", ":")  # of limits, or of amplitudes
-CUT = "nothing passes"  # what a legend says of modes that are not drawn
-LEAST_DB = -40.0  # that is shown of places side by side
+LEAST_DB, LEAST_SENSITIVITY_DB = -40.0, -60.0  # that are shown of places side by side, and of a sensitivity
+LEFT = 10.0  # Hz, up to which the words about a peak stand to its right
 MOST_AMPLITUDES = len(STYLES)  # in a comparison
 
 
@@ -37,7 +53,7 @@ def plot_family(study: Study, mask: Mask, stroke: float, measured: Sequence[Spec
 def plot_places(study: Study, places: Sequence[Place], mask: Mask, stroke: float) -> Figure:
     """The amplitude family at each place, side by side, in front of its linear envelope, with the limits."""
     figure = Figure(figsize=(1.5 + 3.6 * max(len(places), 2), 7), layout="constrained")
-    panels = figure.subplots(2, len(places), sharex=True, sharey="row", squeeze=False, height_ratios=(3, 2))
+    panels = bode_panels(figure, len(places))
     ends = []
     for (gain, phase), place in zip(panels.T, places, strict=True):
         where = {"set": place.corner, "load": place.bias}
@@ -46,8 +62,8 @@ def plot_places(study: Study, places: Sequence[Place], mask: Mask, stroke: float
         gain.set_title(study.words(place), fontsize="medium")
         ends.append(gain.get_ylim())
     panels[0, 0].set_ylim(max(min(low for low, _ in ends), LEAST_DB), max(high for _, high in ends))
-    for axes in panels[:, 1:].flat:
-        axes.set_ylabel("")
+    for axes in panels.flat:
+        axes.label_outer()
     figure.suptitle(f"load angle over reference; {READING}", fontsize="medium")
     _legend(figure, panels.flat)
     return figure
@@ -56,12 +72,12 @@ def plot_places(study: Study, places: Sequence[Place], mask: Mask, stroke: float
 def _draw_limits(gain: Axes, phase: Axes, mask: Mask, stroke: float) -> None:
     for k, limit in enumerate(mask.limits):
         dense = np.geomspace(limit.frequencies[0], limit.frequencies[-1], 100)
-        label = f"limits at {math.degrees(limit.amplitude * stroke):.3g} deg"
+        label = f"limits at {ANGLE.text(limit.amplitude * stroke)}"
         for side, axes, scale in (
             ("gain_low_db", gain, 1.0),
             ("gain_high_db", gain, 1.0),
-            ("phase_low", phase, 180 / math.pi),
-            ("phase_high", phase, 180 / math.pi),
+            ("phase_low", phase, ANGLE.scale),
+            ("phase_high", phase, ANGLE.scale),
         ):
             if getattr(limit, side):
                 style = STYLES[k % len(STYLES)]
@@ -85,7 +101,7 @@ def _legend(figure: Figure, panels: Iterable[Axes]) -> None:
 def plot_beside(studies: Sequence[Study], amplitudes: Sequence[float]) -> Figure:
     """The same sines through every actuator: a color each, a line style per amplitude [rad]."""
     figure = Figure(figsize=(9, 7), layout="constrained")
-    gain, phase = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    gain, phase = bode_panels(figure)[:, 0]
     for k, study in enumerate(studies):
         place = study.words(next(iter(study.checks)))
         name = ", ".join(part for part in (study.case.name, place) if part)
@@ -95,23 +111,70 @@ def plot_beside(studies: Sequence[Study], amplitudes: Sequence[float]) -> Figure
             known = np.isfinite(response)
             moves = moves.astype(bool) & known
             word = "" if moves.any() else STILL if known.any() else FAILED
-            label = f"{name}, {math.degrees(amplitude):.3g} deg{word}"
-            size = np.full(len(hertz), np.nan)
-            size[moves] = to_db(abs(response[moves]))
-            angle = np.degrees(phase_of(response, moves))
-            for axes, values in ((gain, size), (phase, angle)):
-                axes.semilogx(hertz, values, style, color=f"C{k}", marker=".", linewidth=1.2, label=label)
-    gain.set_ylabel("gain in dB")
-    phase.set_ylabel("phase in deg")
-    phase.set_xlabel("frequency in Hz")
-    phase.yaxis.set_major_locator(MaxNLocator(nbins=7, steps=[1, 1.5, 3, 4.5, 9, 10]))
-    plain_hertz(phase)
-    for axes in (gain, phase):
-        axes.grid(alpha=0.3, which="both")
+            line: dict[str, Any] = {
+                "linestyle": style,
+                "color": f"C{k}",
+                "marker": ".",
+                "label": f"{name}, {ANGLE.text(amplitude)}{word}",
+            }
+            draw_bode(gain, phase, hertz, response, known=moves, **line)
+    finish_bode(gain, phase)
     gain.set_title(
         "load angle over reference; a line ends where nothing moves or a simulation failed", fontsize="medium"
     )
-    figure.legend(
-        *gain.get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize="small", frameon=False
-    )
+    legend_below(figure, gain, 2)
     return figure
+
+
+def plot_sensitivities(found: Mapping[str, Sensitivities | None], title: str) -> Figure:
+    """|S| and |T| of every mode in which anything passes, in front of the envelope of all, the largest marked."""
+    figure = Figure(figsize=(9, 6), layout="constrained")
+    panels = figure.subplots(2, 1, sharex=True)
+    passing = {mode: each for mode, each in found.items() if each is not None}
+    for axes, index, name in (
+        (panels[0], 0, "sensitivity |S| in dB"),
+        (panels[1], 1, "complementary\nsensitivity |T| in dB"),
+    ):
+        curves = {mode: ((each.sensitivity, each.complementary)[index]) for mode, each in passing.items()}
+        hertz = next(iter(passing.values())).frequencies / (2 * np.pi)
+        sizes = to_db(np.array(list(curves.values())))
+        draw_envelope(axes, hertz, sizes.min(axis=0), sizes.max(axis=0))
+        for k, (mode, curve) in enumerate(curves.items()):
+            axes.plot(hertz, to_db(curve), linewidth=1.2, label=mode, **mode_style(mode, k))
+        peaks = {mode: (each.sensitivity_peak, each.complementary_peak)[index] for mode, each in passing.items()}
+        _mark(axes, peaks, ("$M_S$ = {:.3g}", "$M_T$ = {:.3g}")[index])
+        axes.set_ylabel(name)
+        axes.set_ylim(max(float(sizes.min()) - 4, LEAST_SENSITIVITY_DB), max(float(sizes.max()), 0.0) + 8)
+        axes.grid(alpha=0.3, which="both")
+    name_cut(panels[0], [mode for mode in found if mode not in passing])
+    panels[0].set_title(title, fontsize="medium")
+    finish_frequency(panels[1])
+    legend_below(figure, panels[0], 3)
+    return figure
+
+
+def plot_compliance(models: Mapping[str, control.StateSpace], peaks: Mapping[str, Peak]) -> Figure:
+    """Load angle over load torque in every mode; the largest is marked, of what is in contact and of what flies."""
+    figure = plot_modes(models, "load angle over load torque, all loops closed", "rad/(N m)")
+    gain = figure.axes[0]
+    for flies in (False, True):
+        chosen = {mode: each for mode, each in peaks.items() if (f", {FREE} " in mode) == flies}
+        if any(each.value > 0 for each in chosen.values()):
+            _mark(gain, chosen, "{:.3g} rad/(N m)")
+    gain.set_ylim(top=gain.get_ylim()[1] + 10)
+    return figure
+
+
+def _mark(axes: Axes, peaks: Mapping[str, Peak], words: str) -> None:
+    """A point at the largest of several peaks, with its value; none where there is no peak."""
+    mode = max(peaks, key=lambda each: peaks[each].value)
+    value, frequency = peaks[mode]
+    if math.isnan(frequency):
+        return
+    hertz, height = frequency / (2 * math.pi), to_db(value)
+    axes.plot([hertz], [height], "o", color=PEAK_COLOR, markersize=5, zorder=5)
+    axes.annotate(
+        f"{words.format(value)} at {hertz:.3g} Hz, {mode}", (hertz, height), xytext=(0, 7), textcoords="offset points",
+        fontsize="small", color=PEAK_COLOR, ha="left" if hertz < LEFT else "right", zorder=6,
+        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1},
+    )  # fmt: skip

@@ -12,13 +12,12 @@ from matplotlib.figure import Figure
 
 from actuator import LiftedMargins, Margins, Spectrum
 from actuator.linear.margins.sensitivity import Sensitivities
-from actuator.plots.linear import plot_modes
+from actuator.plots.bode import plot_modes
 from studies.cache import program
 from studies.findings import Findings, versions
-from studies.frequency.loop_pictures import plot_compliance, plot_sensitivities
 from studies.frequency.mask import LimitCheck
 from studies.frequency.page import SIDES, html
-from studies.frequency.pictures import plot_beside, plot_family, plot_places
+from studies.frequency.pictures import plot_beside, plot_compliance, plot_family, plot_places, plot_sensitivities
 from studies.frequency.plan import PARTS, Plan
 from studies.frequency.study import Study
 from studies.frequency.tables import margin_rows, response_rows, stiffness_rows, write_netcdf, write_rows

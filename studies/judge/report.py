@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from actuator.diagnosis.countermeasures import Remedy, cells
 from actuator.orbits.sampled import PeriodicOrbit
-from actuator.plots.linear import plot_bode
+from actuator.plots.bode import plot_loops
 from actuator.plots.runs import plot_run
 from actuator.stiction.margins import MOST
 from studies.findings import Findings, finite, rendered, versions
@@ -39,7 +39,7 @@ def figures(judgment: Judgment) -> dict[str, Figure]:
     names = next((list(model.loops) for model in judgment.models if model.loops), [])
     for name in names:
         loops = {model.mode: model.loops[name] for model in judgment.models if model.loops}
-        found[f"bode_{name}"] = plot_bode(loops, f"Loop transfer, opened at {name.replace('_', ' ')}")
+        found[f"bode_{name}"] = plot_loops(loops, f"Loop transfer, opened at {name.replace('_', ' ')}")
     insight = judgment.insight
     if insight.orbit is not None:
         found["orbit"] = insight.orbit.plot()

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from matplotlib.figure import Figure
 
-from actuator.linear.bode import phase_of, to_db
+from actuator.plots.bode import bode_panels, draw_bode, finish_bode
 from actuator.simulation.signals import Step
 from actuator.simulation.simulate import simulate
 from actuator.stiction.standstill import rest_of
@@ -63,8 +63,8 @@ def loops_picture(tuned: Tuned) -> Figure:
     """Loops in the corners that decide and both sliding directions, before and after."""
     linear = for_linear_models(tuned.original)
     figure = Figure(figsize=(9, 5.5), layout="constrained")
-    panels = figure.subplots(2, 2, sharex=True, sharey="row")
     opened = loops_of(linear.system())
+    panels = bode_panels(figure, len(opened))
     names = {corner.name: corner for corner in tuned.corners}
     for corner in {m.corner for m in worst(tuned.design.measures).values()}:
         modes = corner_modes(linear, names[corner], 1.0, tuned.before)
@@ -73,20 +73,18 @@ def loops_picture(tuned: Tuned) -> Figure:
                 curves = curves_at(moved(modes.points[mode], gains), gains)
                 for column, at in enumerate(opened):
                     hertz, loop = curves.frequencies(at) / (2 * math.pi), curves.loop(at)
-                    panels[0, column].semilogx(hertz, to_db(abs(loop)), color=color, lw=1, label=label)
-                    panels[1, column].semilogx(hertz, np.degrees(phase_of(loop)), color=color, lw=1)
+                    draw_bode(panels[0, column], panels[1, column], hertz, loop, color=color, linewidth=1, label=label)
     for column, at in enumerate(opened):
         panels[0, column].set_title(f"opened at {at.replace('_', ' ')}", fontsize="medium")
         panels[0, column].axhline(0, color="#888888", lw=1)
         panels[1, column].axhline(-180, color="#888888", lw=1)
-        panels[1, column].set_xlabel("frequency in Hz")
+        finish_bode(panels[0, column], panels[1, column])
     panels[0, 0].set_ylabel("loop gain in dB")
-    panels[1, 0].set_ylabel("phase in deg")
     panels[0, 0].set_ylim(-80, 120)
     handles = {label: handle for handle, label in zip(*panels[0, 0].get_legend_handles_labels(), strict=True)}
     panels[0, 1].legend(handles.values(), handles.keys(), fontsize="small")
     for axes in panels.flat:
-        axes.grid(alpha=0.3)
+        axes.label_outer()
     return figure
 
 

@@ -5,7 +5,7 @@ import pytest
 from mass_on_guide import MassOnGuide
 
 from actuator import Actuator, NotAtRest, TorqueSource, find_equilibrium_set, predict_breakaway, simulate
-from actuator.simulation.run import find_standstill
+from actuator.system.contact_modes import find_standstill
 from gear import Backlash, Bearing, Coulomb, ExternalPair, Linear, Mesh, Shaft, Transmission
 
 MASS = MassOnGuide()

@@ -13,7 +13,7 @@ import pytest
 
 from actuator import simulate
 from actuator.simulation.compiled import compiler
-from actuator.simulation.run import STUCK
+from actuator.system.contact_modes import STUCK
 from studies.checks.paper import figure_9, figure_9_inputs, figure_9_start
 
 DURATION = 10.0

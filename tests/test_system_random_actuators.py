@@ -11,7 +11,7 @@ import pytest
 from random_actuators import draw
 
 from actuator import simulate
-from actuator.simulation.run import STUCK
+from actuator.system.contact_modes import STUCK
 from actuator.system.hybrid import MARGIN_BAND
 from gear.mesh import MESH_SPEED_NOMINAL
 from gear.transmission import BEARING_SPEED_NOMINAL

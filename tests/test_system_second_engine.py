@@ -15,8 +15,8 @@ from random_actuators import draw
 from scipy.integrate import solve_ivp
 
 from actuator import Actuator, Constant, TorqueSource, simulate
-from actuator.simulation.run import contact_labels
 from actuator.simulation.signals import piece_at
+from actuator.system.contact_modes import contact_labels
 from controllers import PID
 from gear import Bearing, Shaft, Transmission
 from studies.checks.paper import figure_9, figure_9_inputs, figure_9_start

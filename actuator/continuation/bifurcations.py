@@ -14,7 +14,7 @@ import numpy as np
 from actuator.orbits.flow import along
 from actuator.orbits.orbit import Orbit
 from actuator.orbits.sampled import SampledOrbit
-from actuator.simulation.run import STUCK, contact_labels
+from actuator.system.contact_modes import STUCK, contact_labels
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

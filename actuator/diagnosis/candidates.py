@@ -11,9 +11,10 @@ import numpy as np
 from actuator.actuator import Actuator
 from actuator.diagnosis.cycle_energy import changed_parameters
 from actuator.parts.sensors import Sensors
-from actuator.simulation.run import FREE, STUCK, Run
+from actuator.simulation.run import Run
 from actuator.stiction.breakaway import NotAtRest
 from actuator.stiction.equilibrium_set import EquilibriumSet, find_equilibrium_set
+from actuator.system.contact_modes import FREE, STUCK
 from actuator.system.drive import ANGLES
 from actuator.system.parameters import with_values
 from actuator.verdict.verdict import classify

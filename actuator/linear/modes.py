@@ -15,7 +15,7 @@ from actuator.linear.model import linearize
 from actuator.linear.operating_point import MOTIONS, NoEquilibrium, OperatingPoint
 from actuator.linear.sampled import without_counts
 from actuator.linear.trim import trim
-from actuator.simulation.run import FREE, STUCK, contact_labels
+from actuator.system.contact_modes import FREE, STUCK, contact_labels
 from actuator.system.hybrid import HybridSystem
 from gear.quantities import require_known
 

@@ -8,7 +8,7 @@ import numpy as np
 from actuator.actuator import Actuator
 from actuator.linear.jacobians import eliminated, rates_function, rates_jacobian, rounding, slips
 from actuator.linear.operating_point import STOPS, NoEquilibrium, OperatingPoint, modes_of, usual_flank
-from actuator.simulation.run import contact_labels
+from actuator.system.contact_modes import contact_labels
 from actuator.system.hybrid import HybridSystem
 from gear.quantities import require_known
 

@@ -8,7 +8,8 @@ import numpy as np
 
 from actuator.orbits.flow import NoOrbit
 from actuator.orbits.sampled import SampledOrbit, TickMap, continue_run, tick_map
-from actuator.simulation.run import Run, find_standstill
+from actuator.simulation.run import Run
+from actuator.system.contact_modes import find_standstill
 from actuator.system.hybrid import HybridSystem
 
 NEWTON_STEPS = 8

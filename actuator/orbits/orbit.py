@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 from actuator.orbits.flow import FlowMap
 from actuator.orbits.segments import Segment
-from actuator.simulation.run import contact_labels, find_standstill, label_rows
+from actuator.system.contact_modes import contact_labels, find_standstill, label_rows
 from actuator.system.hybrid import HybridSystem
 
 if TYPE_CHECKING:

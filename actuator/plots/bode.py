@@ -15,7 +15,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 from actuator.linear.bode import FREQUENCIES, bode_of, envelope, passes, phase_of, to_db
 from actuator.linear.margins.crossings import margins
 from actuator.plots.style import DEGREES, MODE_COLORS, legend_below
-from actuator.simulation.run import BACKWARD
+from actuator.system.contact_modes import BACKWARD
 
 FLOOR_DB = -120.0
 SHADE, EDGE = "#e8e8e8", "#c4c4c4"

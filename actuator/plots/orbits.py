@@ -11,12 +11,12 @@ from matplotlib.patches import Circle
 from actuator.describing.describing import TRUSTED
 from actuator.plots.runs import draw_signals, height_of
 from actuator.plots.style import ABOVE, shown_as
-from actuator.simulation.run import contact_labels
+from actuator.system.contact_modes import contact_labels
 from gear.quantities import require_known
 
 if TYPE_CHECKING:
     from actuator.continuation.bifurcations import Branch
-    from actuator.describing.check import DescribedHunting
+    from actuator.describing.check import DescribingCheck
     from actuator.orbits.orbit import Orbit
 
 SPAN = 1e3  # of frequency, below and above that of the orbit, over which a loop is drawn
@@ -78,7 +78,7 @@ def plot_branch(branch: "Branch") -> Figure:
     return figure
 
 
-def plot_describing_functions(check: "DescribedHunting") -> Figure:
+def plot_describing_functions(check: "DescribingCheck") -> Figure:
     """The loop and -1/N over the complex plane, and the harmonics of the orbit's load speed."""
     figure = Figure(figsize=(11, 4.5), layout="constrained")
     plane, bars = figure.subplots(1, 2)

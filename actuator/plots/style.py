@@ -11,7 +11,7 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from actuator.simulation.run import BACKWARD, FORWARD, FREE, STUCK
+from actuator.system.contact_modes import BACKWARD, FORWARD, FREE, STUCK
 from actuator.verdict.verdict import Verdict
 
 

@@ -14,10 +14,10 @@ from actuator.response.fourier import fourier
 from actuator.simulation.engine import Engine, engine
 from actuator.simulation.failures import SimulationError
 from actuator.simulation.prepared import EngineOptions
-from actuator.simulation.run import BACKWARD, FORWARD, find_standstill, label_rows
 from actuator.simulation.signals import Constant, Signal, Sine, piece_at
 from actuator.simulation.window_points import join
 from actuator.stiction.standstill import find_rest, middle, slowest_constant, soaked
+from actuator.system.contact_modes import BACKWARD, FORWARD, find_standstill, label_rows
 from actuator.system.hybrid import HybridSystem
 from gear.quantities import require_known
 

@@ -1,11 +1,12 @@
 """A completed run: signals by name, the modes of every contact, and when they changed."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from actuator.system.contact_modes import STUCK, contact_labels, is_at_rest, label_rows
 from actuator.system.hybrid import HybridSystem
 from gear.quantities import require_known
 
@@ -15,9 +16,6 @@ if TYPE_CHECKING:
 
     from actuator.simulation.signals import Signal
     from actuator.simulation.window_points import Window
-
-STUCK, FORWARD, BACKWARD, FREE = "stuck", "forward", "backward", "free"
-LABELS = {0: STUCK, 1: FORWARD, -1: BACKWARD, 2: STUCK, -2: STUCK}  # +-2: stuck at its limit, held by others
 
 
 class ModeChange(NamedTuple):
@@ -37,42 +35,6 @@ class Statistics(NamedTuple):
     events: int  # instants at which modes were decided
     settled: int  # events the integrator missed and the check after it found
     compiled: bool
-
-
-def contact_labels(system: HybridSystem, values: Sequence[float] | np.ndarray) -> dict[str, str]:
-    """Mode of each contact in words, from the mode variables."""
-    named = dict(zip(system.modes, values, strict=True))
-    return {
-        contact.name: FREE if contact.flank and named[contact.flank] == 0 else LABELS[int(named[contact.motion])]
-        for contact in system.contacts
-    }
-
-
-def label_rows(system: HybridSystem, values: np.ndarray) -> dict[str, np.ndarray]:
-    """Modes of each contact in words, from rows of the mode variables."""
-    rows = dict(zip(system.modes, values, strict=True))
-    table = np.array([LABELS[k] for k in (-2, -1, 0, 1, 2)])
-    found = {}
-    for contact in system.contacts:
-        labels = table[rows[contact.motion].astype(int) + 2]
-        found[contact.name] = np.where(rows[contact.flank] == 0, FREE, labels) if contact.flank else labels
-    return found
-
-
-def is_at_rest(labels: Sequence[str] | np.ndarray) -> np.ndarray:
-    """Whether contacts in these modes are at rest, (K,) or (K, n): some stuck, all others in their gaps.
-
-    A mesh in its gap tells nothing of the shafts beside it; what sticks does.
-    """
-    labels = np.asarray(labels)
-    stuck = labels == STUCK
-    return stuck.any(axis=0) & (stuck | (labels == FREE)).all(axis=0)
-
-
-def find_standstill(modes: Mapping[str, np.ndarray]) -> np.ndarray:
-    """At which points of rows of modes everything is at rest; a contact that never sticks is not asked."""
-    rows = np.array(list(modes.values()))
-    return is_at_rest(rows[(rows == STUCK).any(axis=1)]) if rows.size else np.zeros(rows.shape[-1:], bool)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,8 +11,8 @@ from actuator.orbits.flow import FlowMap, NoOrbit, flow_map
 from actuator.orbits.segments import cut_motion
 from actuator.simulation.engine import engine
 from actuator.simulation.prepared import EngineOptions
-from actuator.simulation.run import STUCK, contact_labels, is_at_rest
 from actuator.simulation.signals import Piece
+from actuator.system.contact_modes import STUCK, contact_labels, is_at_rest
 from actuator.system.hybrid import EventKind, HybridSystem
 from gear.quantities.roles import ShaftSpeed
 

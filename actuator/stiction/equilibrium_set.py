@@ -16,8 +16,8 @@ import numpy as np
 
 from actuator.actuator import Actuator
 from actuator.parts.torque_source import TorqueSource
-from actuator.simulation.run import FREE, STUCK, contact_labels, is_at_rest
 from actuator.stiction.breakaway import NotAtRest, find_unsupported
+from actuator.system.contact_modes import FREE, STUCK, contact_labels, is_at_rest
 from actuator.system.hybrid import HybridSystem, ModeKind
 from gear.quantities.roles import ShaftAngle, ShaftSpeed
 

@@ -26,7 +26,7 @@ from actuator.plots.bode import (
 )
 from actuator.plots.response import FAILED, READING, STILL, draw_responses
 from actuator.plots.style import legend_below, shown_as
-from actuator.simulation.run import FREE
+from actuator.system.contact_modes import FREE
 from studies.frequency.corners import Place
 from studies.frequency.mask import Mask
 from studies.frequency.study import Study

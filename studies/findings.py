@@ -13,10 +13,12 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from matplotlib.figure import Figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 LIBRARIES = ("geared-actuator", "casadi", "control", "numpy", "scipy", "matplotlib")
 DPI = 130
@@ -41,7 +43,7 @@ class Findings:
         Gives report.html from the pictures, by name, in base64.
     """
 
-    pictures: Mapping[str, Figure | bytes]
+    pictures: "Mapping[str, Figure | bytes]"
     result: dict[str, Any]
     text: list[str]
     files: Mapping[str, str | Callable[[Path], None]] = field(default_factory=dict)
@@ -118,7 +120,7 @@ def _written_before(folder: Path) -> set[str]:
         return set()
 
 
-def png(figure: Figure) -> bytes:
+def png(figure: "Figure") -> bytes:
     """A figure as a picture."""
     image = io.BytesIO()
     figure.savefig(image, dpi=DPI, format="png")

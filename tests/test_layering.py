@@ -53,7 +53,7 @@ ROOMS = {
     "actuator": ((*ACTUATOR, "diagnosis", "response"), "system"),
     "studies": (("judge", "hunting", "tuning", "robustness", "frequency", "checks"), None),
 }
-PICTURES = "plots"  # entered by results when they are drawn, and knows them all
+PICTURES = "plots"  # entered by results when they are drawn; itself it knows results only for type checkers
 OPEN = ("__init__.py", "__main__.py")  # bring all together
 
 
@@ -88,3 +88,58 @@ def test_every_package_was_looked_at():
 def test_an_import_inside_a_function_is_seen():
     tree = ast.parse("def late():\n    from actuator.simulation.run import Run\n    import studies.report as report\n")
     assert set(imported_packages(tree)) == {"actuator", "studies"}
+
+
+# -- circles and pictures -----------------------------------------------------------------------------------
+
+MODULES = {".".join(file.with_suffix("").parts): file for file in FILES}
+DRAW = {"actuator": ("actuator/plots/*.py",), "studies": ("studies/*/pictures.py",)}
+
+
+def run_time_imports(tree, late):
+    """Modules imported when the program runs: at module level, and `late` inside functions; not for type checkers."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+            continue
+        if isinstance(node, ast.ImportFrom) and node.level == 0:
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+            yield node.module
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif late or not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            yield from run_time_imports(node, late)
+
+
+def circles(graph):
+    """Groups of modules that reach each other: what is left when modules that nobody of them imports are taken away."""
+    left = {name: set(seen) & set(graph) - {name} for name, seen in graph.items()}
+    while free := {name for name, seen in left.items() if not seen & set(left)}:
+        left = {name: seen for name, seen in left.items() if name not in free}
+    return sorted(left)
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_no_files_import_each_other_in_a_circle(late):
+    assert circles({name: set(run_time_imports(parsed(file), late)) for name, file in MODULES.items()}) == []
+
+
+def test_a_circle_is_seen():
+    found = circles({"a": {"b"}, "b": {"c", "numpy"}, "c": {"a"}, "d": {"a"}, "e": set()})
+    assert {"a", "b", "c"} <= set(found) and "e" not in found
+    source = "if TYPE_CHECKING:\n    import a\nclass B:\n    import b\n    def f(self):\n        from c import d\n"
+    assert set(run_time_imports(ast.parse(source), late=False)) == {"b"}
+    assert set(run_time_imports(ast.parse(source), late=True)) == {"b", "c", "c.d"}
+
+
+@pytest.mark.parametrize("file", [file for file in FILES if file.parts[0] in DRAW], ids=str)
+def test_pictures_are_drawn_in_one_room(file):
+    if any(file.match(pattern) for pattern in DRAW[file.parts[0]]):
+        return
+    assert [name for name in run_time_imports(parsed(file), late=True) if name.partition(".")[0] == "matplotlib"] == []
+
+
+@pytest.mark.parametrize("file", [file for file in FILES if file.match("actuator/*/*.py")], ids=str)
+def test_pictures_are_entered_only_when_they_are_drawn(file):
+    if PICTURES not in file.parts:
+        names = run_time_imports(parsed(file), late=False)
+        assert [name for name in names if name.startswith(f"actuator.{PICTURES}")] == []

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from actuator.plots.style import CYCLE, VERDICT_COLORS
+from actuator.plots.style import CYCLE
 from actuator.verdict.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -15,6 +15,16 @@ if TYPE_CHECKING:
     from actuator.diagnosis.countermeasures import RemedyTable
     from actuator.diagnosis.cycle_energy import CycleEnergy
 
+VERDICT_COLORS = {
+    Verdict.REST: "#2e8b57",
+    Verdict.HUNTING: "#c0392b",
+    Verdict.LIMIT_CYCLE: "#e1812c",
+    Verdict.QUANTIZER: "#8e6bb0",
+    Verdict.DIVERGING: "#4d4d4d",
+    Verdict.IRREGULAR: "#d9b44a",
+    Verdict.UNDECIDED: "#f2dfa5",
+    Verdict.FAILED: "#ffffff",
+}
 GIVES, TAKES = "#c0392b", "#3b75af"
 ROW = 0.32  # inch per bar
 ROOM = 0.4  # of the longest bar, for the words behind it

@@ -12,7 +12,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from actuator.system.contact_modes import BACKWARD, FORWARD, FREE, STUCK
-from actuator.verdict.verdict import Verdict
 
 
 class Shown(NamedTuple):
@@ -35,16 +34,6 @@ PLAY, CYCLE, LOAD_SPEED = Shown("arcmin", 60 * DEGREES), Shown("mrad", 1e3), Sho
 UNITS = {"rad": Shown("deg", DEGREES)}  # that are shown as another one wherever nothing else is said
 
 MODE_COLORS = {STUCK: "#4d4d4d", FORWARD: "#3b75af", BACKWARD: "#e1812c", FREE: "#d9d9d9"}
-VERDICT_COLORS = {
-    Verdict.REST: "#2e8b57",
-    Verdict.HUNTING: "#c0392b",
-    Verdict.LIMIT_CYCLE: "#e1812c",
-    Verdict.QUANTIZER: "#8e6bb0",
-    Verdict.DIVERGING: "#4d4d4d",
-    Verdict.IRREGULAR: "#d9b44a",
-    Verdict.UNDECIDED: "#f2dfa5",
-    Verdict.FAILED: "#ffffff",
-}
 ABOVE: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1, 0.97), "fontsize": "small", "frameon": False}
 
 

@@ -4,9 +4,7 @@ import base64
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
-
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from actuator import (
     Actuator,
@@ -27,6 +25,9 @@ from actuator import (
 )
 from actuator.response.bench.steps import Numbers
 from studies.findings import png
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SMALLEST = 1e-5  # of the stroke, from which the threshold is sought
 LARGEST = 0.5  # of the stroke, up to which it is
@@ -80,7 +81,7 @@ class Found(NamedTuple):
     """What comes of a test."""
 
     numbers: Numbers
-    figure: Figure | None
+    figure: "Figure | None"
     words: str = ""
 
 

@@ -5,10 +5,9 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from actuator import LiftedMargins, Margins, Spectrum
 from actuator.linear.margins.sensitivity import Sensitivities
@@ -21,6 +20,9 @@ from studies.frequency.pictures import plot_beside, plot_compliance, plot_family
 from studies.frequency.plan import PARTS, Plan
 from studies.frequency.study import Study
 from studies.frequency.tables import margin_rows, response_rows, stiffness_rows, write_netcdf, write_rows
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 ABREAST = 3  # places in a picture
 
@@ -71,7 +73,7 @@ def _compared(plan: Plan) -> list[float]:
     return sorted({limit.amplitude * plan.stroke for limit in plan.mask.limits})
 
 
-def _pictures(plan: Plan, study: Study, measured: Sequence[Spectrum]) -> dict[str, Figure]:
+def _pictures(plan: Plan, study: Study, measured: Sequence[Spectrum]) -> "dict[str, Figure]":
     linear = study.linear
     places = list(study.checks)
     found = {"family": plot_family(study, plan.mask, plan.stroke, measured), "harmonics": study.family.plot_harmonics()}

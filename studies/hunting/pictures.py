@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from actuator.plots.style import VERDICT_COLORS
+from actuator.plots.diagnosis import VERDICT_COLORS
 from actuator.verdict.verdict import DIVERGING, FAILED
 from studies.hunting.map import LABELS
 

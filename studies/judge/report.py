@@ -4,9 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict
 from functools import partial
-from typing import Any
-
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING, Any
 
 from actuator.diagnosis.countermeasures import Remedy, cells
 from actuator.orbits.sampled import PeriodicOrbit
@@ -15,6 +13,9 @@ from actuator.plots.runs import plot_run
 from actuator.stiction.margins import MOST
 from studies.findings import Findings, finite, rendered, versions
 from studies.judge.study import Insight, Judgment
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 STEP_VIEW = 1.5  # s of the step that are shown
 CYCLES_VIEW = 3.5  # periods of a cycle that are shown
@@ -26,7 +27,7 @@ def case_findings(judgment: Judgment, text: list[str]) -> Findings:
     return Findings(pictures=figures(judgment), result=result, text=text, page=partial(_html, judgment, result))
 
 
-def figures(judgment: Judgment) -> dict[str, Figure]:
+def figures(judgment: Judgment) -> "dict[str, Figure]":
     """The pictures of a judgment by file name."""
     run, hunting = judgment.run, judgment.hunting
     signals = [name for name in ("motor_angle_at_load", "load_angle", "reference", "current") if name in run.signals]

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -21,6 +21,7 @@ from controllers.shapes import closing_rate, saturate
 from controllers.units import DerivativeGain, IntegralGain, Limit, PositiveGain, Rate, Share, Time
 from gear.quantities import Scalar, check
 from gear.quantities.registry import part
+from gear.quantities.roles import LoopGain
 
 ANGLE = 1e-4  # rad, a usual size; an angle is fine when the deflection of teeth is
 ABOVE = 10.0  # rate of the filter of the derivative over the bandwidth, in the closed form
@@ -37,7 +38,7 @@ class P:
         [output/error]; in a position loop with speed as output it is the bandwidth [1/s].
     """
 
-    gain: Rate
+    gain: Annotated[Rate, LoopGain("proportional")]
 
     def __post_init__(self) -> None:
         check(self)

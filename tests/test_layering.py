@@ -54,7 +54,7 @@ ROOMS = {
     "studies": (("judge", "hunting", "tuning", "robustness", "frequency", "checks"), None),
 }
 PICTURES = "plots"  # entered by results when they are drawn; itself it knows results only for type checkers
-OPEN = ("__init__.py", "__main__.py")  # bring all together
+OPEN = ("__init__.py", "__main__.py", "contracts.py")  # bring all together
 
 
 @pytest.mark.parametrize("file", [file for file in FILES if file.parts[0] in ROOMS], ids=str)

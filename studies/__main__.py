@@ -9,19 +9,14 @@ from click.core import ParameterSource
 
 from actuator import __version__
 from studies.cases import built_in, load_case
-from studies.checks.commands import benchmark, cross_check, gear_paper
-from studies.commands import FOLDER, RESUMES
-from studies.frequency.commands import frequency_response
-from studies.hunting.commands import hunting
-from studies.judge.commands import THOROUGH, run, run_case
-from studies.robustness.commands import robustness
-from studies.tuning.commands import tuning
+from studies.judge.commands import THOROUGH, Judge
+from studies.study import FOLDER, RESUMES, load_commands, run_study
 
 DEFAULT_CASE = "aileron"
 
 
 class Interrupted(click.ClickException):
-    """Ctrl-C; what is said is all that is shown."""
+    """Ctrl-C; the message is all that is shown."""
 
     exit_code = 130
 
@@ -44,23 +39,24 @@ class CaseGroup(click.Group):
         try:
             return super().invoke(ctx)
         except (KeyboardInterrupt, click.Abort):
-            goes_on = "" if ctx.invoked_subcommand == "benchmark" else "; the same command goes on where it stopped"
-            raise Interrupted(f"interrupted{goes_on}") from None
+            command = self.commands.get(ctx.invoked_subcommand or "run")
+            resumes = command is not None and RESUMES in (command.epilog or "")
+            raise Interrupted(f"interrupted{'; repeat the command to resume' if resumes else ''}") from None
 
 
 @click.group(cls=CaseGroup, invoke_without_command=True, subcommand_metavar="[PATH.toml | COMMAND]", epilog=RESUMES)
 @click.version_option(__version__, prog_name="geared-actuator")
 @click.option("--case", default=DEFAULT_CASE, show_default=True, help="Built-in case to run.")
 @click.option("--out", type=FOLDER, default=Path("out"), show_default=True,
-              help="Folder for the results; those of a COMMAND stand in a folder of its name in it.")  # fmt: skip
+              help="Folder for the results; those of a COMMAND go to OUT/COMMAND.")  # fmt: skip
 @click.option("--list", "listing", is_flag=True, help="List the built-in cases.")
 @click.option("--thorough", is_flag=True, help=THOROUGH)
-@click.option("--verbose", is_flag=True, help="Say how the simulation runs.")
+@click.option("--verbose", is_flag=True, help="Log how the simulation runs.")
 @click.pass_context
 def main(  # noqa: PLR0913, PLR0917 - one per option
     context: click.Context, case: str, out: Path, listing: bool, thorough: bool, verbose: bool
 ) -> None:
-    """Simulate a geared actuator, say whether it hunts, linearize it, and write a report.
+    """Simulate a geared actuator, judge whether it hunts, linearize it, and write a report.
 
     Without a command: run a built-in case, or the case in the file PATH.toml.
     """
@@ -72,27 +68,19 @@ def main(  # noqa: PLR0913, PLR0917 - one per option
             for name in built_in():
                 click.echo(f"{name:{width}}  {load_case(name).title}")
         else:
-            run_case(case, out, thorough)
+            run_study(lambda: Judge(case=load_case(case), thorough=thorough), out)
         return
-    for name in ("case", "listing") if context.invoked_subcommand == "run" else ("case", "listing", "thorough"):
-        if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
-            option = "--list" if name == "listing" else f"--{name}"
-            raise click.UsageError(f"{option} is not for {context.invoked_subcommand!r}; leave it out")
+    command = main.commands[context.invoked_subcommand]
+    taken = [parameter.name for parameter in command.params]
+    for name, option in (("case", "--case"), ("listing", "--list"), ("thorough", "--thorough")):
+        given = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
+        if given and (name != "thorough" or name not in taken):
+            raise click.UsageError(f"{option} does not apply to {context.invoked_subcommand!r}; leave it out")
 
 
-COMMANDS = {
-    "run": run,
-    "hunting": hunting,
-    "tuning": tuning,
-    "robustness": robustness,
-    "frequency-response": frequency_response,
-    "gear-paper": gear_paper,
-    "cross-check": cross_check,
-    "benchmark": benchmark,
-}
-for _name, _command in COMMANDS.items():
-    _command.short_help = " ".join((_command.help or "").partition("\n\n")[0].split())  # not cut off in the list
-    main.add_command(_command, _name)
+COMMANDS = load_commands()
+for _command in COMMANDS.values():
+    main.add_command(_command)
 
 
 if __name__ == "__main__":

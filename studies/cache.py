@@ -1,7 +1,7 @@
-"""Results kept on disk as they come: a mapping whose items are lines of a file, so that a study can go on later.
+"""Results on disk as they come: a mapping whose items are lines of a file, so that an interrupted study can be resumed.
 
-Every study keeps what it has finished in one file of its folder, `finished.jsonl`. Its first line says which program
-wrote it: what another one found is not used again, and goes with the first result of this one. A half-written last
+Every study writes what it has finished to one file of its folder, `finished.jsonl`. Its first line says which program
+wrote it: the results of another program are not used, and go with the first result of this one. A half-written last
 line is what a kill leaves; it is dropped, and its point computed again.
 """
 
@@ -14,35 +14,63 @@ from collections.abc import Callable, Iterable, Iterator, MutableMapping
 from functools import cache
 from importlib import metadata, resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from cattrs.preconf.json import JsonConverter, make_converter
-
-if TYPE_CHECKING:
-    from actuator import Actuator
 
 FILE = "finished.jsonl"
 PACKAGES = ("gear", "controllers", "actuator", "studies")
 TEXTS = (".py", ".json")  # what results depend on; case files do so by their numbers, which are part of the keys
 LIBRARIES = ("casadi", "control", "matplotlib", "numpy", "scipy")
 
+T = TypeVar("T")
 
-class Kept(MutableMapping[str, dict[str, Any]]):
+
+# -- fingerprints -------------------------------------------------------------------------------------------
+
+
+def fingerprint(*parts: Any) -> str:
+    """A hash of actuators, numbers and texts: the same for the same, in every process."""
+    text = json.dumps(parts, sort_keys=True, default=repr)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+@cache
+def program_fingerprint() -> str:
+    """A hash of all that computes and shows a study, as it was when it was first asked for."""
+    folders = [Path(str(resources.files(package))) for package in PACKAGES]
+    return fingerprint(hash_source(folders), {name: metadata.version(name) for name in LIBRARIES})
+
+
+def hash_source(folders: Iterable[Path]) -> str:
+    """A hash of the program text in folders and all folders below them."""
+    found = hashlib.sha256()
+    for folder in folders:
+        for path in sorted(path for path in folder.rglob("*") if path.suffix in TEXTS):
+            found.update(f"{path.relative_to(folder).as_posix()}\n".encode() + path.read_bytes())
+    return found.hexdigest()
+
+
+# -- the file -----------------------------------------------------------------------------------------------
+
+
+class Cache(MutableMapping[str, dict[str, Any]]):
     """Results by key, each written to the file when it is set.
 
     Parameters
     ----------
     path : Path
         Of the file, which need not exist.
-    by : str or None
-        The program that found them; None for this one.
+    program : str or None
+        Fingerprint of the program that computes them; None for this one.
     """
 
-    def __init__(self, path: Path, by: str | None = None) -> None:
+    def __init__(self, path: Path, program: str | None = None) -> None:
         self.path = path
+        self.reused: set[str] = set()  # keys that were in the file and have been read
         self._items: dict[str, dict[str, Any]] = {}
-        self._head = json.dumps({"program": by or program()}).encode() + b"\n"
+        self._head = json.dumps({"program": program or program_fingerprint()}).encode() + b"\n"
         self._lock = threading.Lock()
         text = path.read_bytes() if path.exists() else b""
         self._begun = text.startswith(self._head)
@@ -52,9 +80,13 @@ class Kept(MutableMapping[str, dict[str, Any]]):
                 os.truncate(path, len(whole))
             rows = map(json.loads, whole[len(self._head) :].splitlines())
             self._items = {row["key"]: row["result"] for row in rows}
+        self._loaded = frozenset(self._items)
 
     def __getitem__(self, key: str) -> dict[str, Any]:
-        return self._items[key]
+        item = self._items[key]
+        if key in self._loaded:
+            self.reused.add(key)
+        return item
 
     def __setitem__(self, key: str, result: dict[str, Any]) -> None:
         row = json.dumps({"key": key, "result": result}).encode() + b"\n"
@@ -68,7 +100,10 @@ class Kept(MutableMapping[str, dict[str, Any]]):
             self._items[key] = result
 
     def __delitem__(self, key: str) -> None:
-        raise TypeError(f"{self.path}: what is kept is not taken back; remove the file")
+        raise TypeError(f"{self.path}: results cannot be deleted one by one; delete the file")
+
+    def __contains__(self, key: object) -> bool:
+        return key in self._items
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._items)
@@ -77,8 +112,8 @@ class Kept(MutableMapping[str, dict[str, Any]]):
         return len(self._items)
 
 
-def kept_in(folder: Path) -> Kept:
-    """What is finished of the studies in a folder; it is made, and written to, before hours go into it.
+def open_cache(folder: Path) -> Cache:
+    """The results of the studies in a folder; it is made, and written to, before hours go into it.
 
     Raises
     ------
@@ -88,37 +123,10 @@ def kept_in(folder: Path) -> Kept:
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryFile(dir=folder):
         pass
-    return Kept(folder / FILE)
+    return Cache(folder / FILE)
 
 
-@cache
-def program() -> str:
-    """A fingerprint of all that computes and shows a study, as it was when it was first asked for."""
-    folders = [Path(str(resources.files(package))) for package in PACKAGES]
-    return fingerprint([source(folders), {name: metadata.version(name) for name in LIBRARIES}])
-
-
-def source(folders: Iterable[Path]) -> str:
-    """A hash of the program text in folders and all folders below them."""
-    found = hashlib.sha256()
-    for folder in folders:
-        for path in sorted(path for path in folder.rglob("*") if path.suffix in TEXTS):
-            found.update(f"{path.relative_to(folder).as_posix()}\n".encode() + path.read_bytes())
-    return found.hexdigest()
-
-
-def fingerprint(what: Any) -> str:
-    """Of numbers and words: the same for the same, in every process."""
-    text = json.dumps(what, sort_keys=True, default=str)
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
-
-
-def actuator_of(actuator: "Actuator", *others: Any) -> str:
-    """Of an actuator, by all its parts, choices and numbers, and of what else a result depends on."""
-    return fingerprint([repr(actuator), *map(repr, others)])
-
-
-T = TypeVar("T")
+# -- steps of a study ---------------------------------------------------------------------------------------
 
 
 def _converter() -> JsonConverter:
@@ -134,89 +142,83 @@ def _converter() -> JsonConverter:
 CONVERTER = _converter()
 
 
-class Missing(Exception):
-    """A part that cannot be made; the message says why."""
+class StepError(Exception):
+    """A step that has no result; the message says why."""
 
 
-class Stages:
-    """The parts of one study.
+class Steps:
+    """Steps of one study, each computed once: taken from the cache, or computed and put there.
 
     Parameters
     ----------
-    kept : mutable mapping of str to dict
-        What is finished, of this study and of others; None to keep nothing.
+    cache : mutable mapping of str to dict
+        Finished steps, of this study and of others; None to cache nothing.
     of : str
-        A fingerprint of all that the parts depend on besides the program.
+        A fingerprint of all that the steps depend on besides the program.
     """
 
-    def __init__(self, kept: MutableMapping[str, dict[str, Any]] | None = None, of: str = "") -> None:
-        self._kept: MutableMapping[str, dict[str, Any]] = {} if kept is None else kept
+    def __init__(self, cache: MutableMapping[str, dict[str, Any]] | None = None, of: str = "") -> None:
+        self._cache: MutableMapping[str, dict[str, Any]] = {} if cache is None else cache
         self._of = of
-        self.taken: list[str] = []  # names of parts that were there
 
-    def get(self, name: str, kind: type[T], make: Callable[[], T], *, failures: tuple = ()) -> T:
-        """The part of that name and type, made only where it is not kept.
+    def compute(self, name: str, kind: type[T], work: Callable[[], T], *, failures: tuple = ()) -> T:
+        """The result of that name and type, computed only where it is not in the cache.
 
         Raises
         ------
-        Missing
-            Where making it raised one of `failures`, now or then: they are kept, too.
+        StepError
+            Where the work raised one of `failures`, now or then: they are cached, too.
         """
-        key = self._key(name)
-        if key in self._kept:
-            self.taken.append(name)
-        else:
+        if name not in self:
             try:
-                self.keep(name, make())
+                self.put(name, work())
             except failures as error:
-                self._kept[key] = {"missing": str(error)}
+                self._cache[self._key(name)] = {"missing": str(error)}
         return self.read(name, kind)
 
     def read(self, name: str, kind: type[T]) -> T:
-        """The part of that name, which is kept; errors as of `get`."""
-        row = self._kept[self._key(name)]
+        """The result of that name, which is in the cache; errors as of `compute`."""
+        row = self._cache[self._key(name)]
         if "missing" in row:
-            raise Missing(row["missing"])
+            raise StepError(row["missing"])
         return CONVERTER.structure(row["part"], kind)
 
-    def keep(self, name: str, part: Any) -> None:
-        """Keep a part under a name."""
-        self._kept[self._key(name)] = {"part": CONVERTER.unstructure(part)}
+    def put(self, name: str, result: Any) -> None:
+        """Put a result into the cache."""
+        self._cache[self._key(name)] = {"part": CONVERTER.unstructure(result)}
 
-    def of(self, kind: type[T]) -> MutableMapping[str, T]:
-        """Parts of a type by name, as the `done` of `run_many`."""
-        return _Parts(self, kind)
+    def results(self, kind: type[T]) -> "StepResults[T]":
+        """Those of one type by name, as `run_many` takes finished points."""
+        return StepResults(self, kind)
 
     def __contains__(self, name: object) -> bool:
-        return self._key(name) in self._kept
+        return self._key(str(name)) in self._cache
 
-    def _key(self, name: object) -> str:
+    def _key(self, name: str) -> str:
         return f"{name}, {self._of}"
 
 
-class _Parts(MutableMapping[str, T]):
-    """Parts of one type, as whoever makes many of them reads and writes them."""
+class StepResults(MutableMapping[str, T], Generic[T]):
+    """Results of one type by the names of their steps."""
 
-    def __init__(self, stages: Stages, kind: type[T]) -> None:
-        self._stages, self._kind, self._made = stages, kind, set()
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._stages
+    def __init__(self, steps: Steps, kind: type[T]) -> None:
+        self._steps, self._kind, self._put = steps, kind, set[str]()
 
     def __getitem__(self, name: str) -> T:
-        if name not in self._made:
-            self._stages.taken.append(name)
-        return self._stages.read(name, self._kind)
+        return self._steps.read(name, self._kind)
 
-    def __setitem__(self, name: str, part: T) -> None:
-        self._made.add(name)
-        self._stages.keep(name, part)
+    def __setitem__(self, name: str, result: T) -> None:
+        self._steps.put(name, result)
+        self._put.add(name)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._steps
 
     def __delitem__(self, name: str) -> None:
-        raise TypeError(f"{name}: what is kept is not taken back")
+        raise TypeError("steps are not deleted")
 
     def __iter__(self) -> Iterator[str]:
-        raise TypeError("what is kept is asked for by name")
+        return iter(self._put)
 
     def __len__(self) -> int:
-        raise TypeError("what is kept is asked for by name")
+        return len(self._put)

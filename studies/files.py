@@ -16,7 +16,11 @@ Steps = tuple[str | int, ...]  # the way to a value through tables and lists, in
 LONGEST = 60  # characters of a value in a message
 
 
-class CaseError(ValueError):
+class StudyError(ValueError):
+    """What was asked for cannot be done; the message is one line, with what is allowed instead."""
+
+
+class CaseError(StudyError):
     """A case file that cannot be used; the message names the file, the key, the value and what is allowed."""
 
 

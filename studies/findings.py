@@ -1,4 +1,4 @@
-"""What a study has found, and how it is written: pictures, numbers, sentences, tables, a page. All of it or nothing."""
+"""Findings of a study and how they are written: pictures, numbers, sentences, tables, a page. All files or none."""
 
 import base64
 import io
@@ -27,20 +27,22 @@ RESULT, TEXT, PAGE, WRITING = "result.json", "findings.txt", "report.html", ".wr
 
 @dataclass(frozen=True, kw_only=True)
 class Findings:
-    """What a study has found.
+    """Findings of a study.
 
     Parameters
     ----------
     pictures : mapping of str to Figure or bytes
-        By name; bytes are those of a PNG file.
+        By name; bytes are a PNG file.
     result : dict
-        Everything that is a number, for machines.
+        All numbers, for result.json.
     text : list of str
         Sentences, the most important first.
     files : mapping of str to str or callable
-        More of them by name: their text, or what writes them to a path.
+        Further files by name: the text, or a callable that writes to a path.
     page : callable or None
-        Gives report.html from the pictures, by name, in base64.
+        Renders report.html from the pictures, by name, in base64.
+    passed : bool
+        Whether all checks of the study passed; otherwise its command exits with 1.
     """
 
     pictures: "Mapping[str, Figure | bytes]"
@@ -48,15 +50,16 @@ class Findings:
     text: list[str]
     files: Mapping[str, str | Callable[[Path], None]] = field(default_factory=dict)
     page: Callable[[Mapping[str, str]], str] | None = None
+    passed: bool = True
 
     def save(self, folder: Path) -> list[Path]:
-        """Write all files into `folder`, instead of those of an earlier result; returns their paths.
+        """Write all files into `folder`, in place of those of an earlier result; returns their paths.
 
-        All of them or, on a failure, none: then the earlier ones are there again. Of what is killed in between there is
-        no result.json, which comes last.
+        On a failure none is written and the earlier files are restored. A kill in between leaves no result.json, which
+        is written last.
         """
         folder.mkdir(parents=True, exist_ok=True)
-        for left in folder.glob(f"{WRITING}*"):  # by one that was killed
+        for left in folder.glob(f"{WRITING}*"):  # by a run that was killed
             shutil.rmtree(left, ignore_errors=True)
         earlier = _written_before(folder)
         with tempfile.TemporaryDirectory(dir=folder, prefix=WRITING) as hidden:
@@ -88,7 +91,7 @@ class Findings:
 
 
 def _exchange(folder: Path, new: Path, aside: Path, names: list[str]) -> None:
-    """Move files into a folder and what they replace aside; the last name is the first to go and the last to come.
+    """Move files into a folder and those they replace aside; the last name is removed first and written last.
 
     A directory in the way stays, and is a failure.
     """
@@ -112,7 +115,7 @@ def _exchange(folder: Path, new: Path, aside: Path, names: list[str]) -> None:
 
 
 def _written_before(folder: Path) -> set[str]:
-    """Names that the result in a folder lists."""
+    """Names of the files that the result in a folder lists."""
     try:
         names = json.loads((folder / RESULT).read_text(encoding="utf-8"))["files"]
         return {name for name in names if Path(name).name == name}
@@ -127,15 +130,15 @@ def png(figure: "Figure") -> bytes:
     return image.getvalue()
 
 
-def rendered(template: str, filters: Mapping[str, Callable[..., str]] | None = None, **values: Any) -> str:
-    """A page from a template; every value that it uses must be there, and `made` is the time."""
+def render(template: str, filters: Mapping[str, Callable[..., str]] | None = None, **values: Any) -> str:
+    """Render a template; every value that it uses must be given, and `made` is the time."""
     environment = Environment(loader=PackageLoader("studies"), autoescape=True, undefined=StrictUndefined)
     environment.filters |= dict(filters or {})
     return environment.get_template(template).render(made=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"), **values)
 
 
 def versions(*more: str) -> dict[str, str]:
-    """Of Python and the libraries that a result depends on."""
+    """Versions of Python and of the libraries that a result depends on."""
     return {"python": platform.python_version()} | {name: _version(name) for name in (*LIBRARIES, *more)}
 
 
@@ -147,7 +150,7 @@ def _version(library: str) -> str:
 
 
 def finite(value: Any) -> Any:
-    """The same for JSON: None where a number is not finite."""
+    """The same for JSON, with None in place of numbers that are not finite."""
     if isinstance(value, dict):
         return {key: finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

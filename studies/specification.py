@@ -1,54 +1,76 @@
-"""What a tuned actuator has to do, and the corners in which: read from a file."""
+"""What a tuned actuator has to do, and in which corners: read from a file."""
 
-import fnmatch
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from enum import StrEnum
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated
 
 from annotated_types import Ge, Gt, Le, Unit
 
 from actuator.actuator import Actuator
 from gear.quantities import check
 from studies.cases import Case, load_case
-from studies.files import CaseError, CaseFile, read
+from studies.corners import AS_IS, Corner, CornerSettings, Setting, find_corner, select
+from studies.files import CaseError, CaseFile, StudyError, read
 from studies.structure import structure
 
 SPREADS = ("uniform", "normal")
 
 
+class Criterion(StrEnum):
+    """What is demanded, or bounds a demand."""
+
+    GAIN_MARGIN = "gain margin"
+    PHASE_MARGIN = "phase margin"
+    DELAY_MARGIN = "delay margin"
+    BANDWIDTH = "bandwidth"
+    OVERSHOOT = "overshoot"
+    STIFFNESS = "stiffness"
+    PEAK_CURRENT = "peak current"
+    PEAK_TORQUE = "peak torque"
+    SLIP = "slip"
+    STANDING_ERROR = "standing error"
+    GAIN_RANGE = "gain range"
+
+    @property
+    def upper(self) -> bool:
+        """Whether its limit is the largest value."""
+        return self in (Criterion.OVERSHOOT, Criterion.PEAK_CURRENT, Criterion.PEAK_TORQUE, Criterion.SLIP)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Demand:
-    """What is demanded in every corner.
+    """Demands, to be met in every corner.
 
     Parameters
     ----------
     stroke : float
-        From end to end [rad].
+        Travel of the load from end to end [rad].
     amplitude : float
-        Of the sine for the bandwidth and of the step for the current [-], over the stroke.
+        Amplitude of the sine for the bandwidth and of the step for current and overshoot, over the stroke [-].
     bandwidth : float
-        Frequency [Hz] up to which the load follows a sine of that amplitude within 3 dB, friction and all.
+        Frequency [Hz] up to which the load follows a sine of that amplitude within 3 dB, friction included.
     gain_margin, phase_margin : float
-        Of the loops opened at speed reference and torque reference, in every mode [-], [rad]; the gain margin holds for
-        gains that rise and gains that fall.
+        Margins of the loops opened at speed reference and torque reference, in every mode [-], [rad]; the gain margin
+        holds for increased and for reduced gain.
     delay_margin : float
-        Of the same loops: what is not in the model may take [s], which with a controller in continuous time is sampling
-        too.
+        Delay [s] that the same loops tolerate: for all that is not modeled, including sampling where the controller is
+        in continuous time.
     overshoot : float
-        Of a step of the amplitude [-].
+        Overshoot of a step of the amplitude [-].
     stiffness : float
-        Load torque over load angle [N m/rad] at the frequency at which that is least.
+        Least load torque over load angle [N m/rad] at any frequency.
     peak_current, peak_torque : float or None
-        Of the motor in a step of the amplitude [A], [N m]; None where it may be any. A motor without electric part has
+        Peak of the motor in a step of the amplitude [A], [N m]; None for no limit. A motor without electric part has
         no current.
     standing_error : float
-        Largest position error at which the actuator may come to rest [rad].
+        Largest position error at rest [rad].
     stiction_margin : float
-        Factor on all breakaway friction up to which nothing hunts [-].
+        Factor on all breakaway friction up to which the actuator does not hunt [-].
     """
 
     stroke: Annotated[float, Unit("rad"), Gt(0)]
@@ -69,7 +91,7 @@ class Demand:
 
     @property
     def sine(self) -> float:
-        """The amplitude at the load [rad]."""
+        """Amplitude at the load [rad]."""
         return self.amplitude * self.stroke
 
 
@@ -82,9 +104,9 @@ class Tuning:
     gains : tuple of str
         Names of parameters.
     dead_band : bool
-        Whether the integral of the speed law may get a dead band.
+        Whether the integral may be given a dead band.
     range : float
-        Factor up and down from the closed-form start [-].
+        Largest factor by which a gain may differ from the closed-form start, either way [-].
     """
 
     gains: tuple[str, ...]
@@ -97,20 +119,25 @@ class Tuning:
 
 @dataclass(frozen=True, kw_only=True)
 class Change:
-    """What a corner changes: factors on parameters and their values, by name or pattern (`gear.meshes.*.gap`)."""
+    """What an entry of an axis changes: factors on parameters and their values, by names as of `studies.corners`."""
 
     factors: Mapping[str, float] = field(default_factory=dict)
     values: Mapping[str, float] = field(default_factory=dict)
 
+    def settings(self) -> list[Setting]:
+        """The factors, then the values."""
+        factors = [Setting(name, factor, factor=True) for name, factor in self.factors.items()]
+        return factors + [Setting(name, value, factor=False) for name, value in self.values.items()]
+
 
 @dataclass(frozen=True, kw_only=True)
 class Tolerance:
-    """How a parameter spreads, over its nominal value.
+    """Tolerance of a parameter, relative to its nominal value.
 
     Parameters
     ----------
     parameter : str
-        Name, or a pattern for several that spread together.
+        Name as of `studies.corners`; several parameters spread together.
     spread : "uniform" or "normal"
         Uniform between 1 - size and 1 + size, or normal about 1 with this standard deviation.
     size : float
@@ -125,13 +152,6 @@ class Tolerance:
         check(self)
         if self.spread not in SPREADS:
             raise ValueError(f'Tolerance.spread must be "uniform" or "normal", got {self.spread!r}')
-
-
-class Corner(NamedTuple):
-    """A named set of parameters."""
-
-    name: str
-    parameters: dict[str, float]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,9 +169,9 @@ class Specification:
     tuning : Tuning
         What may be changed.
     corners : mapping of str to mapping of str to Change
-        Axes, and the entries of each; every combination is a corner.
+        Axes with their entries; every combination is a corner.
     tolerances : tuple of Tolerance
-        Of a production, for the study of robustness.
+        Production tolerances, for the robustness study.
     """
 
     title: str
@@ -162,38 +182,30 @@ class Specification:
     tolerances: tuple[Tolerance, ...] = ()
 
     def all_corners(self, plant: Actuator) -> list[Corner]:
-        """Every combination of the axes; one without a name where there are none."""
-        defaults = {parameter.name: float(parameter.default) for parameter in plant.system().parameters}
-        found = []
+        """Every combination of the axes, for an actuator; as it is where there are none.
+
+        Raises
+        ------
+        StudyError
+            Where it has no such parameter, or a value breaks a rule of its component.
+        """
+        system, found = plant.system(), []
         for entries in itertools.product(*(axis.items() for axis in self.corners.values())):
-            values: dict[str, float] = {}
-            for _, change in entries:
-                for pattern, factor in change.factors.items():
-                    for name in matching(pattern, defaults):
-                        values[name] = factor * values.get(name, defaults[name])
-                for pattern, value in change.values.items():
-                    values |= dict.fromkeys(matching(pattern, defaults), value)
-            found.append(Corner(", ".join(name for name, _ in entries) or "as it is", values))
+            name = ", ".join(name for name, _ in entries) or AS_IS
+            settings = tuple(setting for _, change in entries for setting in change.settings())
+            found.append(find_corner(system, CornerSettings(name, settings)))
         return found
 
 
-def matching(pattern: str, names: Mapping[str, Any] | Sequence[str]) -> list[str]:
-    """The names that a pattern fits; KeyError where there is none."""
-    found = [name for name in names if fnmatch.fnmatchcase(name, pattern)]
-    if not found:
-        raise KeyError(f"no parameter fits {pattern!r}")
-    return found
-
-
 def built_in_specifications() -> dict[str, Traversable]:
-    """The specifications that come with the package, by the name of their case."""
+    """The specifications of this package, by the names of their cases."""
     folder = resources.files("studies") / "data" / "specifications"
     found = {file.name.removesuffix(".toml"): file for file in folder.iterdir() if file.name.endswith(".toml")}
     return dict(sorted(found.items()))
 
 
 def load_specification(name: str | Path) -> tuple[Specification, Case]:
-    """A built-in specification by name, else a file; with its case.
+    """Read a built-in specification by name, or a file; with its case.
 
     Raises
     ------
@@ -203,7 +215,7 @@ def load_specification(name: str | Path) -> tuple[Specification, Case]:
     file = built_in_specifications().get(str(name))
     if file is None and not Path(name).exists():
         names = ", ".join(built_in_specifications())
-        raise CaseError(f"{name}: there is no such specification; the built-in ones are {names}")
+        raise CaseError(f"{name}: no such specification; the built-in ones are {names}")
     source: CaseFile = read(file or Path(name).resolve())
     specification: Specification = structure(source, (), Specification)
     at = (
@@ -212,7 +224,7 @@ def load_specification(name: str | Path) -> tuple[Specification, Case]:
         else Path(name).parent / specification.case
     )
     case = load_case(at)
-    defaults = [parameter.name for parameter in case.actuator.system().parameters]
+    parameters = case.actuator.system().parameters
     steps: list[tuple[tuple[str | int, ...], str]] = [
         (("corners", axis, entry, kind), pattern)
         for axis, entries in specification.corners.items()
@@ -224,7 +236,7 @@ def load_specification(name: str | Path) -> tuple[Specification, Case]:
     steps += [(("tolerances", k), each.parameter) for k, each in enumerate(specification.tolerances)]
     for where, pattern in steps:
         try:
-            matching(pattern, defaults)
-        except KeyError as error:
-            raise source.error(where, f"is refused: {error.args[0]} of {case.name}") from None
+            select(parameters, pattern, factor=True)
+        except StudyError as error:
+            raise source.error(where, f"does not fit {case.name}: {error}") from None
     return specification, case

@@ -19,7 +19,17 @@ import actuator
 from actuator import SinePoint, SineStream
 from actuator.response.frequency_response import point_key
 from actuator.simulation.many import run_many
-from studies.cache import FILE, PACKAGES, Kept, Missing, Stages, actuator_of, kept_in, program, source
+from studies.cache import (
+    FILE,
+    PACKAGES,
+    Cache,
+    StepError,
+    Steps,
+    fingerprint,
+    hash_source,
+    open_cache,
+    program_fingerprint,
+)
 from studies.cases import load_case
 
 # -- the file -----------------------------------------------------------------------------------------------
@@ -28,49 +38,49 @@ from studies.cases import load_case
 @given(lines=st.integers(0, 4), cut=st.integers(0, 200))
 def test_a_file_cut_anywhere_gives_its_whole_lines_and_can_be_gone_on_with(tmp_path_factory, lines, cut):
     path = tmp_path_factory.mktemp("cut") / FILE
-    kept = Kept(path)
+    cache = Cache(path)
     for k in range(lines):
-        kept[str(k)] = {"x": k / 3}
+        cache[str(k)] = {"x": k / 3}
     whole = path.read_bytes() if path.exists() else b""
     path.write_bytes(whole[: max(0, len(whole) - cut)])
     left = max(0, path.read_bytes().count(b"\n") - 1)
-    again = Kept(path)
+    again = Cache(path)
     assert dict(again) == {str(k): {"x": k / 3} for k in range(left)}
     again["new"] = {"x": math.inf}
-    assert dict(Kept(path)) == dict(again)
+    assert dict(Cache(path)) == dict(again)
     assert len(again) == left + 1
 
 
 def test_what_another_program_found_is_not_used_and_does_not_pile_up(tmp_path):
     path = tmp_path / FILE
     for version in ("one", "two", "three"):
-        kept = Kept(path, by=version)
-        assert not kept
-        kept["a"] = {"x": version}
+        cache = Cache(path, program=version)
+        assert not cache
+        cache["a"] = {"x": version}
     assert [json.loads(line) for line in path.read_text().splitlines()] == [
         {"program": "three"},
         {"key": "a", "result": {"x": "three"}},
     ]
-    assert not Kept(path)
+    assert not Cache(path)
 
 
 def test_looking_at_another_programs_file_leaves_it_as_it_is(tmp_path):
     path = tmp_path / FILE
-    Kept(path, by="long work")["a"] = {"x": 1.0}
-    assert not Kept(path)
-    assert Kept(path, by="long work")["a"] == {"x": 1.0}
+    Cache(path, program="long work")["a"] = {"x": 1.0}
+    assert not Cache(path)
+    assert Cache(path, program="long work")["a"] == {"x": 1.0}
 
 
 def test_every_study_keeps_in_the_same_file(tmp_path):
-    kept = kept_in(tmp_path / "a" / "b")
-    assert kept.path == tmp_path / "a" / "b" / FILE
-    assert list(kept.path.parent.iterdir()) == []  # nothing before there is a result
+    cache = open_cache(tmp_path / "a" / "b")
+    assert cache.path == tmp_path / "a" / "b" / FILE
+    assert list(cache.path.parent.iterdir()) == []  # nothing before there is a result
 
 
 def test_a_folder_that_cannot_be_written_is_told_before_the_work(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(OSError):
-        kept_in(tmp_path / "file" / "out")
+        open_cache(tmp_path / "file" / "out")
 
 
 # -- the program --------------------------------------------------------------------------------------------
@@ -82,22 +92,22 @@ def test_the_program_is_the_text_in_all_folders_below(tmp_path):
     (tmp_path / "a.py").write_text("a")
     (room / "b.py").write_text("b")
     (room / "notes.txt").write_text("no part of it")
-    before = source([tmp_path])
+    before = hash_source([tmp_path])
     (room / "notes.txt").write_text("still none")
-    assert source([tmp_path]) == before
+    assert hash_source([tmp_path]) == before
     (room / "b.py").write_text("c")
-    assert source([tmp_path]) != before
+    assert hash_source([tmp_path]) != before
     (room / "b.py").rename(room / "c.py")
     (room / "c.py").write_text("b")
-    assert source([tmp_path]) != before
+    assert hash_source([tmp_path]) != before
 
 
 def test_the_program_has_its_rooms():
     root = Path(actuator.__file__).parent.parent
     assert all((root / package).is_dir() for package in PACKAGES)
-    whole = source([root / "actuator"])
-    assert whole != source(sorted(path for path in (root / "actuator").iterdir() if path.is_dir()))
-    assert program() == program() and len(program()) == 16
+    whole = hash_source([root / "actuator"])
+    assert whole != hash_source(sorted(path for path in (root / "actuator").iterdir() if path.is_dir()))
+    assert program_fingerprint() == program_fingerprint() and len(program_fingerprint()) == 16
 
 
 # -- an actuator --------------------------------------------------------------------------------------------
@@ -115,10 +125,10 @@ def test_an_actuator_is_told_by_its_choices_and_whole_numbers_too():
         replace(made, controller=replace(loops, feedback="motor")),
     )
     point = SinePoint(amplitude=1.0, frequency=1.0)
-    for name in (actuator_of, lambda each: point_key(SineStream(plant=each), point)):
+    for name in (fingerprint, lambda each: point_key(SineStream(plant=each), point)):
         assert len({name(each) for each in (made, *others)}) == 1 + len(others)
         assert name(replace(made)) == name(made)
-    assert actuator_of(made, 1.0) != actuator_of(made)
+    assert fingerprint(made, 1.0) != fingerprint(made)
 
 
 # -- parts --------------------------------------------------------------------------------------------------
@@ -152,10 +162,11 @@ def part(**changes):
 
 def test_a_part_comes_back_as_it_was(tmp_path):
     made = part(other=part(values=np.array([np.nextafter(1, 2)])))
-    first = Stages(Kept(tmp_path / FILE), "case").get("part", Part, lambda: made)
-    stages = Stages(Kept(tmp_path / FILE), "case")
-    again = stages.get("part", Part, lambda: pytest.fail("made again"))
-    assert stages.taken == ["part"]
+    first = Steps(Cache(tmp_path / FILE), "case").compute("part", Part, lambda: made)
+    cache = Cache(tmp_path / FILE)
+    steps = Steps(cache, "case")
+    again = steps.compute("part", Part, lambda: pytest.fail("made again"))
+    assert cache.reused == {"part, case"}
     for found in (first, again):
         assert repr(found) == repr(made)
         np.testing.assert_array_equal(found.values, made.values)
@@ -163,12 +174,12 @@ def test_a_part_comes_back_as_it_was(tmp_path):
 
 
 def test_a_part_of_another_case_is_made_anew(tmp_path):
-    kept = Kept(tmp_path / FILE)
-    Stages(kept, "one").keep("part", 1.0)
-    stages = Stages(kept, "two")
-    assert stages.get("part", float, lambda: 2.0) == 2.0
-    assert stages.taken == []
-    assert Stages(kept, "one").read("part", float) == 1.0
+    cache = Cache(tmp_path / FILE)
+    Steps(cache, "one").put("part", 1.0)
+    steps = Steps(cache, "two")
+    assert steps.compute("part", float, lambda: 2.0) == 2.0
+    assert cache.reused == set()
+    assert Steps(cache, "one").read("part", float) == 1.0
 
 
 def test_a_failure_is_kept_like_a_result_and_others_go_through(tmp_path):
@@ -176,21 +187,23 @@ def test_a_failure_is_kept_like_a_result_and_others_go_through(tmp_path):
         raise ValueError("no such cycle")
 
     for make in (fails, lambda: pytest.fail("made again")):
-        with pytest.raises(Missing, match="no such cycle"):
-            Stages(Kept(tmp_path / FILE)).get("part", float, make, failures=(ValueError,))
+        with pytest.raises(StepError, match="no such cycle"):
+            Steps(Cache(tmp_path / FILE)).compute("part", float, make, failures=(ValueError,))
     with pytest.raises(ValueError, match="no such cycle"):
-        Stages(Kept(tmp_path / FILE)).get("another", float, fails, failures=(KeyError,))
-    assert "another" not in Stages(Kept(tmp_path / FILE))
+        Steps(Cache(tmp_path / FILE)).compute("another", float, fails, failures=(KeyError,))
+    assert "another" not in Steps(Cache(tmp_path / FILE))
 
 
 def test_many_parts_of_a_type_are_a_mapping_that_says_which_were_there(tmp_path):
-    stages = Stages(Kept(tmp_path / FILE), "case")
-    assert run_many(half, {"half 1": 1, "half 2": 2}, done=stages.of(float), workers=1) == {"half 1": 0.5, "half 2": 1}
-    assert stages.taken == []
-    again = Stages(Kept(tmp_path / FILE), "case")
-    found = run_many(half, {"half 2": 2, "half 3": 3}, done=again.of(float), workers=1)
+    cache, points = Cache(tmp_path / FILE), {"half 1": 1, "half 2": 2}
+    found = run_many(half, points, done=Steps(cache, "case").results(float), workers=1)
+    assert found == {"half 1": 0.5, "half 2": 1.0}
+    assert cache.reused == set()
+    cache = Cache(tmp_path / FILE)
+    again = Steps(cache, "case")
+    found = run_many(half, {"half 2": 2, "half 3": 3}, done=again.results(float), workers=1)
     assert found == {"half 2": 1.0, "half 3": 1.5}
-    assert again.taken == ["half 2"]
+    assert cache.reused == {"half 2, case"}
 
 
 def half(item):

@@ -216,13 +216,14 @@ def test_an_interrupted_run_says_so_and_goes_on_to_the_same_result(mass, case_fi
         patch.setattr("studies.judge.study.find_causes", interrupt)
         outcome = invoke(path, "--out", out)
     assert outcome.exit_code == 130
-    assert outcome.output.splitlines()[1:] == ["", "interrupted; the same command goes on where it stopped"]
+    assert outcome.output.splitlines()[1:] == ["", "interrupted; repeat the command to resume"]
     assert [each.name for each in out.iterdir()] == ["finished.jsonl"]
     for name in ("find_orbit", "hunting_margin"):
         monkeypatch.setattr(f"studies.judge.study.{name}", lambda *arguments, **options: pytest.fail("computed again"))
     outcome = invoke(path, "--out", out)
     assert outcome.exit_code == 0, outcome.output
-    assert f"taken from {out / 'finished.jsonl'}: orbit, stiction margin, integral gain margin" in outcome.output
+    assert f"Resuming: 3 results found in {out / 'finished.jsonl'}" in outcome.output
+    assert f"3 reused from {out / 'finished.jsonl'}" in outcome.output
     assert numbers(out) == numbers(mass[1])
 
 
@@ -320,7 +321,7 @@ def test_the_report_on_the_aileron_explains_its_hunting(aileron):
     assert without["integral action"]["verdict"] == "rest"
     assert without["breakaway above sliding friction"]["verdict"] == "rest"
     assert result["remedies"][0]["does"] == "rest"
-    assert "best remedy: " in outcome.output
+    assert "best countermeasure: " in outcome.output
     assert "integral gain margin: -" in outcome.output
 
 
@@ -382,7 +383,7 @@ def test_an_unknown_case_is_refused_with_the_names_of_all(arguments, tmp_path):
 def test_an_option_that_a_command_does_not_heed_is_refused(arguments, option):
     outcome = invoke(*arguments)
     assert outcome.exit_code == 2
-    assert f"{option} is not for '{arguments[-1]}'" in outcome.output
+    assert f"{option} does not apply to '{arguments[-1]}'" in outcome.output
 
 
 @pytest.mark.parametrize("command", [(), *((name,) for name in COMMANDS if name not in ("run", "benchmark"))])
@@ -403,7 +404,7 @@ def test_every_command_explains_every_option(command):
     assert all(option.help for option in COMMANDS[command].params if isinstance(option, Option))
     if command != "benchmark":
         assert "--out" in outcome.output
-        assert "goes on where it stopped" in " ".join(outcome.output.split())
+        assert "Repeat the command to resume" in " ".join(outcome.output.split())
 
 
 def test_an_unknown_option_and_an_unknown_command_are_refused():

@@ -33,8 +33,8 @@ def test_the_command_writes_pictures_numbers_and_a_table(written):
     output, folder = written
     pictures = {f"cross_check_{name}.png" for name in ("actuator", "machine", "drive")}
     assert {path.name for path in folder.iterdir()} == pictures | {"result.json", "findings.txt", "finished.jsonl"}
-    assert "All within what is allowed: yes" in output
-    assert "All within what is allowed: yes" in (folder / "findings.txt").read_text(encoding="utf-8")
+    assert "All within their limits: yes" in output
+    assert "All within their limits: yes" in (folder / "findings.txt").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(("start", "allowed"), [("rod", 1e-3), ("machine", 1e-3), ("drive", 3e-2)])
@@ -96,41 +96,41 @@ def test_the_noise_is_uniform_repeats_and_differs_by_its_seed():
 # -- the drive --------------------------------------------------------------------------------------------
 
 
-def worst(stretches):
+def worst(excerpts):
     theirs = record.recorded()
     return max(
-        np.abs(motulator.driven_machine(stretch)[name] - stretch.signals[name]).max() / theirs.peaks[name]
-        for stretch in stretches
+        np.abs(motulator.driven_machine(excerpt)[name] - excerpt.signals[name]).max() / theirs.peaks[name]
+        for excerpt in excerpts
         for name in record.SIGNALS
     )
 
 
 def test_the_machine_needs_the_right_period_of_the_recorded_voltages():
-    stretches = record.recorded().stretches
-    assert worst(stretches) < 1e-5
-    early = [stretch._replace(duties=np.roll(stretch.duties, -1, axis=1)) for stretch in stretches]
+    excerpts = record.recorded().excerpts
+    assert worst(excerpts) < 1e-5
+    early = [excerpt._replace(duties=np.roll(excerpt.duties, -1, axis=1)) for excerpt in excerpts]
     assert worst(early) > 2 * motulator.MACHINE_ALLOWED
 
 
 def test_twice_as_many_steps_do_not_change_the_machine(monkeypatch):
-    stretch = record.recorded().stretches[0]
-    coarse = motulator.driven_machine(stretch)
+    excerpt = record.recorded().excerpts[0]
+    coarse = motulator.driven_machine(excerpt)
     monkeypatch.setattr(motulator, "STEPS", 2 * motulator.STEPS)
     motulator._one_period.cache_clear()
-    fine = motulator.driven_machine(stretch)
+    fine = motulator.driven_machine(excerpt)
     motulator._one_period.cache_clear()
     for name, peak in record.recorded().peaks.items():
         assert 0 < np.abs(fine[name] - coarse[name]).max() < 1e-7 * peak
 
 
 def test_a_whole_record_is_compared_at_every_sample(tmp_path):
-    """A record made here of the stored stretch, in the form of the whole one."""
-    stretch = record.recorded().stretches[0]
-    count = stretch.duties.shape[1]
-    dense = stretch._replace(samples=np.arange(count + 1))
+    """A record made here of the stored excerpt, in the form of the whole one."""
+    excerpt = record.recorded().excerpts[0]
+    count = excerpt.duties.shape[1]
+    dense = excerpt._replace(samples=np.arange(count + 1))
     machine = motulator.driven_machine(dense)
     keys = dict(zip(record.SIGNALS, ("i_d", "i_q", "tau_M", "w_M"), strict=True))
-    duties = np.column_stack([stretch.duties[:, 1:], np.full((3, 2), 0.5)])  # of sample k, acting from k + 1 on
+    duties = np.column_stack([excerpt.duties[:, 1:], np.full((3, 2), 0.5)])  # of sample k, acting from k + 1 on
     path = tmp_path / "reference.npz"
     np.savez(
         path,
@@ -139,13 +139,13 @@ def test_a_whole_record_is_compared_at_every_sample(tmp_path):
         **{key: machine[name] for name, key in keys.items()},
         **dict(zip(("d_a", "d_b", "d_c"), duties, strict=True)),
     )
-    whole = record.recorded(path).stretches[0]
+    whole = record.recorded(path).excerpts[0]
     assert len(whole.samples) == count + 1
-    # the stretch starts at rest but for the voltage that acts on its first period
-    again = motulator.driven_machine(whole._replace(duties=stretch.duties, start=stretch.start))
+    # the excerpt starts at rest but for the voltage that acts on its first period
+    again = motulator.driven_machine(whole._replace(duties=excerpt.duties, start=excerpt.start))
     for name in record.SIGNALS:
         np.testing.assert_allclose(again[name], whole.signals[name], atol=1e-12)
-    np.testing.assert_array_equal(whole.duties[:, 1:], stretch.duties[:, 1:])
+    np.testing.assert_array_equal(whole.duties[:, 1:], excerpt.duties[:, 1:])
 
 
 # -- the table and errors ---------------------------------------------------------------------------------
@@ -155,10 +155,10 @@ def test_a_row_that_is_too_far_says_so():
     row = Deviation(what="x", unit="A", theirs=-2.0, deviation=0.1, allowed=0.03)
     assert row.relative == pytest.approx(0.05)
     assert not row.holds
-    assert "TOO FAR" in table([row])
+    assert "EXCEEDED" in table([row])
     near = replace(row, deviation=-0.05)
     assert near.holds
-    assert "TOO FAR" not in table([near])
+    assert "EXCEEDED" not in table([near])
     assert "2.5 %" in table([near])
 
 
@@ -166,11 +166,11 @@ def test_a_deviation_that_is_too_large_ends_the_command_with_1(monkeypatch, tmp_
     from studies.findings import Findings
 
     row = Deviation(what="x", unit="A", theirs=1.0, deviation=0.1, allowed=0.03)
-    found = Findings(pictures={}, result={"deviations": [row.as_result()]}, text=[table([row])])
+    found = Findings(pictures={}, result={"deviations": [row.as_result()]}, text=[table([row])], passed=row.holds)
     monkeypatch.setattr("studies.checks.commands.run_cross_check", lambda *_: found)
     done = CliRunner().invoke(main, ["cross-check", "--out", str(tmp_path)])
     assert done.exit_code == 1
-    assert "TOO FAR" in done.output
+    assert "EXCEEDED" in done.output
 
 
 def test_a_folder_without_the_results_is_refused(tmp_path):

@@ -17,11 +17,10 @@ from click.testing import CliRunner
 from actuator import SimulationError, SineStream
 from studies.__main__ import main
 from studies.cases import load_case
-from studies.files import CaseError
+from studies.files import CaseError, StudyError
 from studies.frequency.bench import TESTS, BenchPlan
-from studies.frequency.corners import WrongRequest
-from studies.frequency.mask import Limit, checked, load_mask
-from studies.frequency.page import _assumed
+from studies.frequency.mask import Limit, check_limit, load_mask
+from studies.frequency.page import list_assumptions
 from studies.frequency.plan import PARTS, load_positioner
 from studies.frequency.tables import write_netcdf
 
@@ -199,7 +198,7 @@ def test_a_mask_is_kept_or_missed_and_the_second_study_computes_nothing(
     (tmp_path / kept.name).write_text(kept.read_text())
     again = invoke(*options(folder, "missed.toml"), "--out", tmp_path)
     assert again.exit_code == 0, again.output
-    assert "mass: the mask is missed: gain, from above, at 0.4 deg" in again.output
+    assert "mass: the mask is missed: gain, upper limit, at 0.4 deg" in again.output
     rows = json.loads((tmp_path / "result.json").read_text())["cases"]["mass"]["checks"]
     slack = {row["side"]: row["slack"] for row in rows}
     assert slack["gain_high_db"] == pytest.approx(0.5 - peak, abs=0.01)
@@ -242,8 +241,8 @@ def test_what_failed_is_counted_and_not_said_to_stand_still(folder, outcome, tmp
     monkeypatch.setattr(SineStream, "_measured", fails)
     found = invoke(*options(folder), "--out", tmp_path)
     assert found.exit_code == 0, found.output
-    words = "gain, from below, at 0.4 deg and 2 Hz, 1 of 3 simulations failed"
-    assert words in found.output and "mass: 1 of 3 sines have failed." in found.output
+    words = "gain, lower limit, at 0.4 deg and 2 Hz, 1 of 3 simulations failed"
+    assert words in found.output and "mass: 1 of 3 sines failed." in found.output
     assert "nothing moves" not in found.output and "have not settled" not in found.output
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "1 of 3 simulations failed" in page and "no motion" not in page
@@ -260,11 +259,11 @@ def test_a_mass_on_a_bearing_that_sticks_is_studied_and_what_it_has_is_told(fold
     assert found.exit_code == 0, found.output
     page = " ".join((tmp_path / "report.html").read_text(encoding="utf-8").split())
     # each case at its own operating point; each sentence of those that have the part
-    assert "mass, at reference 0: " in page and "rubbing, at reference 0, load_torque 0.1: " in page
-    assert "<li>Contacts truly stick, and slide off at their breakaway (rubbing).</li>" in page
+    assert "mass, reference 0: " in page and "rubbing, reference 0, load_torque 0.1: " in page
+    assert "<li>Contacts stick with zero slip speed, and break away at their breakaway friction (rubbing).</li>" in page
     for word in ("der Linden", "backlash", "inverter", "ecoupling", "winding", "sampled", "Corners and bias loads"):
         assert word not in page, word
-    assert "mass, not done: mass: has no contact that could stick, so no threshold" in page
+    assert "mass, not measured: mass: has no contact that could stick, so no threshold" in page
     result = json.loads((tmp_path / "result.json").read_text())["cases"]
     assert result["rubbing"]["tests"]["threshold"] and "reason" not in result["rubbing"]["tests"]["threshold"]
 
@@ -274,11 +273,11 @@ def test_what_was_assumed_is_told_of_the_cases_that_have_the_part():
     studies = [
         SimpleNamespace(case=case, torque=5.0, stiffness={"unpowered": None}, checks={}, sets={}) for case in cases
     ]
-    told = _assumed(SimpleNamespace(stroke=1.0), studies)
+    told = list_assumptions(SimpleNamespace(stroke=1.0), studies)
     for sentence in (
         "Averaged inverter.",
-        "Decoupling with the motor parameters given.",
-        "Teeth with backlash push and never pull.",
+        "Decoupling with the true motor parameters.",
+        "Teeth with backlash push but do not pull.",
         "Controllers in continuous time (aileron).",
         "Controllers sampled (aileron-sampled).",
         "Unpowered: the winding is open.",
@@ -291,7 +290,7 @@ def test_it_is_said_up_to_which_torque_the_one_that_drives_back_was_sought():
     actuator = load_case("aileron").actuator
     plan = BenchPlan(stroke=1.0, torque=1.0, frequencies=(1.0,), sets={}, inputs={})
     found = TESTS["back driving"](actuator, plan)
-    assert found.words == "forward and backward none was found up to 1 N m"
+    assert found.words == "not back-driven forward and backward up to 1 N m"
     assert all(math.isinf(value) for value, _ in found.numbers.values())
 
 
@@ -326,9 +325,9 @@ def test_a_corner_is_the_case_with_its_parameters_and_all_but_its_sines_are_ther
 
 def test_a_second_case_and_a_record_are_laid_beside_it(folder, outcome):
     page = (folder / "out" / "report.html").read_text(encoding="utf-8")
-    assert "A mass under a PID beside A heavier mass" in page and "Measured records" in page and "rig" in page
-    assert page.count("No bias. Fundamental of the load angle") == 2  # each says of which place it is
-    assert "Shaded where they differ" in page and page.count('class="other"') == 1
+    assert "A mass under a PID and A heavier mass" in page and "Measured responses" in page and "rig" in page
+    assert page.count("No bias. Fundamental of load angle") == 2  # each says of which place it is
+    assert "Parameters that differ are shaded" in page and page.count('class="other"') == 1
     data = xarray.open_dataset(folder / "out" / "responses.nc", engine="scipy").isel(set=0, load=0, output=0)
     assert data.case.values.tolist() == ["mass", "heavier"]
     heavier = data.isel(case=1, amplitude=0)
@@ -356,7 +355,7 @@ def test_limits_are_straight_over_the_logarithm_of_frequency():
     limit = Limit(amplitude=0.1, frequencies=(1.0, 100.0), gain_low_db=(0.0, -6.0))
     np.testing.assert_allclose(limit.at("gain_low_db", np.array([1.0, 10.0, 100.0])), [0.0, -3.0, -6.0], atol=1e-12)
     hertz, moves = np.array([0.5, 1.0, 10.0]), np.ones(3, bool)
-    (check,) = checked(limit, hertz, np.array([1e-6, 1.1, 10 ** (-4 / 20)], complex), moves)
+    (check,) = check_limit(limit, hertz, np.array([1e-6, 1.1, 10 ** (-4 / 20)], complex), moves)
     assert check.slack == pytest.approx(-1.0) and check.frequency == 10.0 and check.points == 2 and not check.met
 
 
@@ -366,7 +365,7 @@ def test_what_does_not_move_or_has_failed_keeps_to_no_lower_limit():
         (1e-15, [False, True], "nothing moves"),
         (math.nan, [True, True], "1 of 2 simulations failed"),
     ):
-        checks = checked(limit, np.array([1.0, 2.0]), np.array([value, 1.0], complex), np.array(moves))
+        checks = check_limit(limit, np.array([1.0, 2.0]), np.array([value, 1.0], complex), np.array(moves))
         assert [check.slack for check in checks] == [-math.inf, -math.inf]
         assert [check.nothing for check in checks] == [words, words]
 
@@ -396,12 +395,12 @@ def test_a_wrong_mask_is_refused(name, tmp_path):
 
 WRONG = {
     "an unknown case": (("ailerons",), "cannot be read"),
-    "amplitudes that are no numbers": (("--amplitudes", "1;2"), "--amplitudes are numbers with commas"),
+    "amplitudes that are no numbers": (("--amplitudes", "1;2"), "--amplitudes takes numbers separated by commas"),
     "an amplitude beyond the stroke": (
         ("--amplitudes", "80"),
-        "at most 50 % of the stroke, and at least one, got 80 %",
+        "<= 50 % of the stroke, at least one, got 80 %",
     ),
-    "frequencies that fall": (("--frequencies", 2, 1, 3), "--frequencies are FROM TO COUNT with 0 < FROM <= TO"),
+    "frequencies that fall": (("--frequencies", 2, 1, 3), "--frequencies takes FROM TO COUNT with 0 < FROM <= TO"),
     "no frequency within the mask": (("--frequencies", 100, 200, 2), "no frequency is within limit 1 of the mask"),
     "a mask that is not there": (("--mask", "nowhere.toml"), "cannot be read"),
     "a record that is not there": (("--measured", "nowhere.csv"), "nowhere.csv: cannot be read"),
@@ -428,13 +427,13 @@ def test_a_wrong_study_is_refused_in_one_line_and_nothing_is_written(name, tmp_p
 def test_a_motor_without_limits_needs_a_torque(folder, tmp_path):
     found = invoke(folder / "mass.toml", "--out", tmp_path / "out")
     assert found.exit_code == 2
-    assert "its motor has no largest torque; give the one at the load with --torque" in found.output
+    assert "its motor has no torque limit; give the largest torque at the load with --torque" in found.output
 
 
 def test_a_case_without_a_controller_has_no_response(folder, tmp_path):
     path = tmp_path / "open.toml"
     path.write_text(MASS[: MASS.index("[controller]")] + "[scenario]\nduration = 1\n")
-    with pytest.raises(WrongRequest, match="open: has no position controller"):
+    with pytest.raises(StudyError, match="open has no position controller"):
         load_positioner(path)
 
 
@@ -449,6 +448,6 @@ def test_help_tells_the_options():
         "--mask",
         "--amplitudes",
         "FROM TO COUNT",
-        "goes on where it stopped",
+        "Repeat the command to resume",
     ):
         assert word in " ".join(found.output.split())

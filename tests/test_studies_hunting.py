@@ -14,12 +14,12 @@ from click.testing import CliRunner
 from mass_on_guide import MassOnGuide
 
 from studies.__main__ import main
-from studies.cache import Kept, Stages
-from studies.corners import Setting, meaning, parameters_of
+from studies.cache import Cache, Steps
+from studies.files import StudyError
 from studies.hunting import map as maps
-from studies.hunting.ends import along, crossings, ends, with_boundary
+from studies.hunting.ends import add_boundary, find_axis, find_crossings, find_ends
 from studies.hunting.map import LABELS, Axis, Plan, compute, dataset
-from studies.hunting.study import WrongPlan, plan_of
+from studies.hunting.study import make_plan
 
 BREAKAWAY, GAIN = "gear.bearings.guide.breakaway", "controller.integral"
 MASS = """
@@ -70,7 +70,7 @@ def plan(case):
 @pytest.fixture(scope="module")
 def points(plan):
     """All points of the map, in this process."""
-    return compute(plan, Stages(), jobs=1)
+    return compute(plan, Steps(), jobs=1)
 
 
 def invoke(*arguments):
@@ -111,20 +111,18 @@ def test_the_data_set_names_everything_and_survives_the_disk(plan, points, tmp_p
 
 
 def test_lines_of_the_map_that_cross_a_boundary_are_found(plan, points):
-    assert along(plan) == "x"
-    found = crossings(plan, points)
+    assert find_axis(plan) == "x"
+    found = find_crossings(plan, points)
     assert sorted(index[1] for index in found) == [1, 2]  # with an integral gain
     assert all(points[index]["verdict"] == "hunting" for index in found)
 
 
 def test_the_exact_boundary_of_the_mass_is_its_sliding_friction(plan, points):
-    stages = Stages()
-    found = ends(plan, crossings(plan, points), stages, jobs=1, progress=lambda count: None)
-    told = []
-    again = ends(plan, crossings(plan, points), stages, jobs=1, progress=told.append)
-    assert told == [len(found)]  # all of them at once: none is followed again
+    steps = Steps()
+    found = find_ends(plan, find_crossings(plan, points), steps, jobs=1, progress=None)
+    again = find_ends(plan, find_crossings(plan, points), steps, jobs=1, progress=lambda *told: pytest.fail("again"))
     assert again.keys() == found.keys()
-    data = with_boundary(plan, dataset(plan, points), found)
+    data = add_boundary(plan, dataset(plan, points), found)
     # the amplitude goes to zero where breakaway friction is no larger than sliding friction
     np.testing.assert_allclose(data.boundary.sel(corner=0, y=[4.0, 8.0]), 1.0, rtol=0, atol=1e-3)
     assert np.isnan(data.boundary.sel(corner=0, y=0.0))
@@ -147,63 +145,37 @@ def test_a_killed_map_goes_on_without_computing_a_point_twice(plan, points, tmp_
         computed.append(index)
         return points[index]
 
-    def stages(plan=plan):
+    def steps(plan=plan):
         """As another process would find them."""
-        return Stages(Kept(tmp_path / "kept.jsonl"), plan.fingerprint())
+        return Steps(Cache(tmp_path / "kept.jsonl"), plan.fingerprint())
 
-    monkeypatch.setattr(maps, "point", counted)
+    monkeypatch.setattr(maps, "compute_point", counted)
     with pytest.raises(Killed):
-        compute(plan, stages(), jobs=1)
+        compute(plan, steps(), jobs=1)
     with (tmp_path / "kept.jsonl").open("a", encoding="utf-8") as file:
         file.write('{"key": "point (0, 1, 1)", "resu')  # what a kill in the middle of a write leaves
-    monkeypatch.setattr(maps, "point", lambda plan, index: counted(plan, index, kill_after=99))
+    monkeypatch.setattr(maps, "compute_point", lambda plan, index: counted(plan, index, kill_after=99))
     told = []
-    assert compute(plan, stages(), jobs=1, progress=told.append) == points
+    assert compute(plan, steps(), jobs=1, progress=lambda *counts: told.append(counts)) == points
     assert sorted(computed) == sorted(plan.indices())
-    assert told[0] == 4 and sum(told) == 9
-    assert compute(plan, stages(), jobs=1) == points  # and now from the disk alone
+    assert told == [(finished, 9) for finished in range(5, 10)]
+    assert compute(plan, steps(), jobs=1) == points  # and now from the disk alone
     assert len(computed) == 9
     other = Plan(case=plan.case, x=plan.x, y=Axis.between(GAIN, 0.0, 8.0, 4))
-    assert "point (0, 0, 0)" in stages() and "point (0, 0, 0)" not in stages(other)
+    assert "point (0, 0, 0)" in steps() and "point (0, 0, 0)" not in steps(other)
 
 
 def test_the_same_map_has_the_same_fingerprint(plan):
     assert plan.fingerprint() == Plan(case=plan.case, x=plan.x, y=plan.y).fingerprint()
 
 
-# -- names ------------------------------------------------------------------------------------------------------
-
-
-def test_a_name_may_be_a_factor_on_many(case):
-    system = maps.load("aileron").actuator.system()
-    factor = meaning(system, "*.breakaway+*.static")
-    assert factor.factor and not factor.single
-    assert len(factor.parameters) == 5
-    changed = parameters_of(system, [Setting("*.breakaway+*.static", 2.0)])
-    assert changed["gear.bearings.hinge.breakaway"] == 18.0
-    assert changed["gear.meshes.first.friction.static"] == pytest.approx(0.6)
-    # never below the sliding friction of the same contact
-    least = parameters_of(system, [Setting("*.breakaway+*.static", 0.1)])
-    assert least["gear.bearings.hinge.breakaway"] == 5.0
-    assert least["gear.meshes.first.friction.static"] == 0.15
-
-
-def test_settings_are_applied_one_after_another_and_one_value_may_be_for_many():
-    system = maps.load("aileron").actuator.system()
-    found = parameters_of(system, [Setting("=*.friction.static", 0.2), Setting("*.static", 1.5)])
-    np.testing.assert_allclose(list(found.values()), [0.3, 0.3], rtol=1e-12)
-    assert meaning(system, "load.bias").single
-    with pytest.raises(KeyError, match="did you mean load.bias"):
-        meaning(system, "load.biass")
-    with pytest.raises(KeyError, match="is of the pattern"):
-        meaning(system, "*.nothing")
-    with pytest.raises(KeyError, match="of different units"):
-        meaning(system, "=*inertia*+*.bias")
+# -- default axes ------------------------------------------------------------------------------------------------------
 
 
 def test_a_map_without_axes_is_that_of_integral_gain_over_breakaway_friction():
-    plan = plan_of("aileron", corners=("load.bias=0", "load.bias=20,load.damping=0.1"))
-    assert plan.x.name == "controller.speed.integral" and plan.y.name == "*.breakaway+*.static"
+    plan = make_plan("aileron", corners=("load.bias=0", "load.bias=20,load.damping=0.1"))
+    assert plan.x.name == "controller.speed.integral" and plan.y.name == "breakaway"
+    assert plan.selection(plan.y).factor and len(plan.selection(plan.y).parameters) == 5
     assert [plan.label(k) for k in (0, 1)] == ["load.bias=0", "load.bias=20, load.damping=0.1"]
     assert len(plan.indices()) == 2 * len(plan.x.values) * len(plan.y.values)
 
@@ -211,8 +183,8 @@ def test_a_map_without_axes_is_that_of_integral_gain_over_breakaway_friction():
 def test_a_case_without_an_integral_gain_needs_axes(tmp_path):
     path = tmp_path / "open.toml"
     path.write_text(MASS[: MASS.index("[controller]")] + "[scenario]\nduration = 1\n")
-    with pytest.raises(WrongPlan, match="has no integral gain to vary; choose two names with --x and --y"):
-        plan_of(path)
+    with pytest.raises(StudyError, match="has no integral gain to vary; choose two names with --x and --y"):
+        make_plan(path)
 
 
 # -- the command line -------------------------------------------------------------------------------------------
@@ -235,8 +207,8 @@ def test_the_command_writes_pictures_numbers_and_the_data_set(case, tmp_path):
 
 def test_several_processes_give_the_same_points(case):
     small = Plan(case=case, x=Axis.between(BREAKAWAY, 1.0, 1.5, 2), y=Axis.between(GAIN, 4.0, 8.0, 2))
-    alone = compute(small, Stages(), jobs=1)
-    together = compute(small, Stages(), jobs=2)
+    alone = compute(small, Steps(), jobs=1)
+    together = compute(small, Steps(), jobs=2)
     assert together == alone
 
 
@@ -271,5 +243,13 @@ def test_an_unknown_case_is_refused_in_one_line(tmp_path):
 def test_help_tells_what_names_may_be():
     outcome = invoke("--help")
     assert outcome.exit_code == 0
-    for word in ("--x", "--corner", "--exact", "--jobs", "NAME FROM TO COUNT", "a factor on every parameter"):
+    for word in (
+        "--x",
+        "--corner",
+        "--exact",
+        "--jobs",
+        "NAME FROM TO COUNT",
+        "values then multiply all matching parameters",
+        "breakaway",
+    ):
         assert word in " ".join(outcome.output.split())

@@ -9,14 +9,18 @@ import sys
 from dataclasses import replace
 from statistics import NormalDist
 
+import casadi as ca
 import numpy as np
 import pytest
 from click.testing import CliRunner
 from mass_on_guide import MassOnGuide
 
 from actuator import classify, simulate
+from actuator.system.parameters import Parameter
+from gear.quantities.roles import Breakaway, Gap, SlidingFriction
 from studies.__main__ import main
-from studies.cache import Kept
+from studies.cache import Cache
+from studies.files import StudyError
 from studies.robustness.robustness import MissingLibrary, factors, robustness, spread, wilson
 from studies.specification import Tolerance
 
@@ -53,14 +57,25 @@ def test_spreads_have_their_moments():
     assert abs(found[:, 0] - 1).max() <= 0.3
 
 
+def parameters(values, **roles):
+    """Parameters of a model that is nowhere, with their roles."""
+    return [
+        Parameter(name, "-", value, ca.SX.sym(name), roles.get(name.partition(".")[2], ()), name.partition(".")[0])
+        for name, value in values.items()
+    ]
+
+
 def test_breakaway_is_never_below_sliding_friction():
+    roles = {"coulomb": (SlidingFriction(),), "breakaway": (Breakaway("coulomb"),), "gap": (Gap(),)}
     values = {"x.coulomb": 1.0, "x.breakaway": 1.1, "y.gap": 2.0}
-    found = spread(values, [Tolerance(parameter="*.coulomb", size=0.5)], [1.4])
-    assert found == {"x.coulomb": 1.4, "x.breakaway": 1.4}
+    model = parameters(values, **roles)
+    found = spread(model, values, [Tolerance(parameter="*.coulomb", size=0.5)], [1.4])
+    assert found == {"x.coulomb": 1.4, "x.breakaway": 1.4, "y.gap": 2.0}
     stribeck = {"x.static": 1.1, "x.coulomb": 1.0}
-    assert spread(stribeck, [Tolerance(parameter="*.static", size=0.5)], [0.7]) == {"x.static": 1.0}
-    with pytest.raises(KeyError, match="no parameter fits 'none'"):
-        spread(values, [Tolerance(parameter="none", size=0.5)], [1.0])
+    law = parameters(stribeck, static=(Breakaway("coulomb"),), coulomb=(SlidingFriction(),))
+    assert spread(law, stribeck, [Tolerance(parameter="*.static", size=0.5)], [0.7])["x.static"] == 1.0
+    with pytest.raises(StudyError, match="no parameter named 'none'"):
+        spread(model, values, [Tolerance(parameter="none", size=0.5)], [1.0])
 
 
 def summed(parameters):
@@ -71,7 +86,7 @@ def test_indices_of_a_sum_in_closed_form():
     nominal = {"a": 1.0, "b": 1.0, "c": 1.0}
     found = robustness(
         summed,
-        nominal,
+        parameters(nominal),
         spreads(c=0.1, a=0.1, b=0.1),
         events={"large": lambda result: result["sum"] > 6},
         measures=("sum",),
@@ -88,7 +103,7 @@ def test_indices_of_a_sum_in_closed_form():
 
 def test_what_does_not_spread_has_its_nominal_value():
     nominal = {"a": 1.0, "b": 1.0, "c": 100.0}
-    found = robustness(summed, nominal, spreads(a=0.1, b=0.1), events={}, measures=(), base=4, workers=1)
+    found = robustness(summed, parameters(nominal), spreads(a=0.1, b=0.1), events={}, measures=(), base=4, workers=1)
     assert all(result["sum"] > 100 for result in found.results)
 
 
@@ -119,7 +134,7 @@ def test_a_mass_on_a_guide_hunts_with_a_known_probability(tmp_path):
         middle = (low + high) / 2
         low, high = (low, middle) if cycles(middle) else (middle, high)
     boundary = (low + high) / 2 / GUIDE.breakaway
-    nominal = {q.name: float(q.default) for q in ACTUATOR.system().parameters}
+    model = ACTUATOR.system().parameters
     options = {
         "events": {"hunting": lambda result: result["verdict"] != "rest"},
         "measures": ("size",),
@@ -128,7 +143,7 @@ def test_a_mass_on_a_guide_hunts_with_a_known_probability(tmp_path):
         "workers": 1,
     }
     path = tmp_path / "kept.jsonl"
-    found = robustness(guided, nominal, spreads(**{BREAKAWAY: 0.2}), done=Kept(path), **options)
+    found = robustness(guided, model, spreads(**{BREAKAWAY: 0.2}), done=Cache(path), **options)
     hunting = found.probabilities["hunting"]
     assert hunting.trials == 16
     assert hunting.low < (1.2 - boundary) / 0.4 < hunting.high
@@ -139,10 +154,10 @@ def test_a_mass_on_a_guide_hunts_with_a_known_probability(tmp_path):
     def never(parameters):
         raise AssertionError("what is kept is not run again")
 
-    again = robustness(never, nominal, spreads(**{BREAKAWAY: 0.2}), done=Kept(path), **options)
+    again = robustness(never, model, spreads(**{BREAKAWAY: 0.2}), done=Cache(path), **options)
     assert again.probabilities == found.probabilities
     with pytest.raises(AssertionError, match="not run again"):  # nor is it taken for something else
-        robustness(never, nominal, spreads(**{BREAKAWAY: 0.2}), about="another demand", done=Kept(path), **options)
+        robustness(never, model, spreads(**{BREAKAWAY: 0.2}), about="another demand", done=Cache(path), **options)
 
 
 @pytest.mark.parametrize(
@@ -151,7 +166,7 @@ def test_a_mass_on_a_guide_hunts_with_a_known_probability(tmp_path):
 )
 def test_wrong_tasks(tolerances, base, says):
     with pytest.raises(ValueError, match=says):
-        robustness(summed, {"a": 1.0}, tolerances, events={}, measures=(), base=base)
+        robustness(summed, parameters({"a": 1.0}), tolerances, events={}, measures=(), base=base)
 
 
 def test_wrong_spread():
@@ -162,7 +177,7 @@ def test_wrong_spread():
 def test_without_the_library_it_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "SALib.analyze", None)
     with pytest.raises(MissingLibrary, match=r"pip install 'geared-actuator\[robustness\]'"):
-        robustness(summed, {"a": 1.0}, spreads(a=0.1), events={}, measures=())
+        robustness(summed, parameters({"a": 1.0}), spreads(a=0.1), events={}, measures=())
 
 
 def test_command_line_says_what_is_wrong_in_one_line(tmp_path):
@@ -170,9 +185,9 @@ def test_command_line_says_what_is_wrong_in_one_line(tmp_path):
     other.write_text("{}")
     for arguments, says in (
         (["nothing"], "the built-in ones are"),
-        (["aileron", "--corner", "hot"], "no corner has 'hot' in its name"),
+        (["aileron", "--corner", "hot"], "no corner name contains 'hot'"),
         (["aileron", "--gains", str(tmp_path / "none.json")], "cannot be read: No such file"),
-        (["aileron", "--gains", str(other)], "is no result.json of a tuning"),
+        (["aileron", "--gains", str(other)], "is not the result.json of a tuning"),
     ):
         ended = CliRunner().invoke(main, ["robustness", *arguments, "--out", str(tmp_path)])
         assert ended.exit_code == 2

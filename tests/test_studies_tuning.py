@@ -16,20 +16,19 @@ from click.testing import CliRunner
 
 from actuator import Actuator, CurrentSource, Load, TorqueSource, loop_transfer, margins, trim
 from actuator.linear.derivatives.continuous import Response, gain_model
-from actuator.stiction.margins import at_least_sliding, sliding_of
 from controllers import Cascade, IntegralRemedies
 from controllers.pid import PI, PID, P
 from gear import Bearing, Shaft, Stribeck, Transmission
 from studies import CaseError, load_case
 from studies.__main__ import main
-from studies.cache import Kept, fingerprint
-from studies.corners import Setting, parameters_of
-from studies.specification import Change, Corner, Demand, Specification, Tuning, load_specification
-from studies.tuning.check import SINE, Bench, CornerCheck, Trial, check_corners, step_trials
+from studies.cache import Cache, fingerprint
+from studies.corners import Corner
+from studies.specification import Change, Criterion, Demand, Specification, Tuning, load_specification
+from studies.tuning.check import SINE, Bench, CornerCheck, StepCase, Trial, check_corners, step_trials
 from studies.tuning.design import Active, design
 from studies.tuning.loops import curves_at, phase_and_delay_margin
 from studies.tuning.measures import measures, worst
-from studies.tuning.modes import corner_modes, slides_as_it_breaks_away
+from studies.tuning.modes import corner_modes, slide_at_breakaway
 from studies.tuning.plant import (
     NotTunable,
     closed_form,
@@ -38,18 +37,19 @@ from studies.tuning.plant import (
     inertia_at_motor,
     with_dead_band,
 )
+from studies.tuning.result import shortfalls
 from studies.tuning.stiction import (
     ACCURACY,
     MOST,
     Search,
     Seeker,
     StictionMargin,
-    least,
     least_margin,
-    rungs,
+    lowest_factor,
+    make_ladder,
     stiction_margins,
 )
-from studies.tuning.study import shortfalls, tune, twins_of
+from studies.tuning.study import find_twins, tune
 
 DEAD_BAND = "controller.speed.remedies.dead_band"
 LOOPS = ("speed_reference", "torque_reference")
@@ -268,16 +268,11 @@ def test_breakaway_is_never_below_the_sliding_friction_of_any_law(aileron):
     law = Stribeck(static=0.12, coulomb=0.1, stribeck_speed=0.01)
     mesh = replace(aileron.gear.meshes["first"], friction=law)
     plant = replace(aileron, gear=replace(aileron.gear, meshes={**aileron.gear.meshes, "first": mesh}))
-    static, name = "gear.meshes.first.friction.static", "*.breakaway+*.static"
-    system = plant.system()
-    assert parameters_of(system, [Setting(name, 0.5)])[static] == 0.1
-    assert parameters_of(system, [Setting(name, 2.0)])[static] == 0.24
-    defaults = {p.name: float(p.default) for p in system.parameters}
-    steps = step_trials(Corner("", {}), {}, demand(), defaults, 0.5)
+    static, system = "gear.meshes.first.friction.static", plant.system()
+    steps = step_trials(Corner("", {}), {}, demand(), system.parameters, 0.5)
     assert {trial.parameters[static] for trial in steps.values()} == {0.1}
-    assert slides_as_it_breaks_away(defaults, 2.0)["gear.meshes.first.friction.coulomb"] == 0.24
-    assert sliding_of(static, {static: 0.12}) is None  # a table's points are no parameters
-    assert at_least_sliding("controller.speed.integral", 0.1, defaults) == 0.1
+    values = {p.name: float(p.default) for p in system.parameters}
+    assert slide_at_breakaway(system.parameters, values, 2.0)["gear.meshes.first.friction.coulomb"] == 0.24
 
 
 # -- a PID -----------------------------------------------------------------------------------------------
@@ -343,7 +338,7 @@ def test_a_pid_is_tuned_until_it_does_not_hunt(positioner):
 def check(**changed):
     usual = {
         "corner": "",
-        "verdicts": {"x1, 1 breakaway": "rest", "x1, 1.5 breakaway": "rest"},
+        "verdicts": {StepCase(1.0, 1.0): "rest", StepCase(1.0, 1.5): "rest"},
         "cycle": 0.0,
         "standing_error": 0.01,
         "followed": 0.9,
@@ -364,9 +359,9 @@ def check(**changed):
         ({"standing_error": 0.11}, {"standing error": 1.02 * 1.1}),
         ({"followed": 0.5}, {"bandwidth": 1.02 / (math.sqrt(2) * 0.5)}),
         ({"followed": 0.0}, {"bandwidth": 1.02 / (math.sqrt(2) * 0.1)}),
-        ({"verdicts": {"x1, 1.5 breakaway": "hunting"}}, {"slip": 1.25}),
+        ({"verdicts": {StepCase(1.0, 1.5): "hunting"}}, {"slip": 1.25}),
         # what hunts is first to stop hunting
-        ({"verdicts": {"x1, 1 breakaway": "hunting"}, "overshoot": 2.0, "peak_current": 1e3}, {"slip": 1.25}),
+        ({"verdicts": {StepCase(1.0, 1.0): "hunting"}, "overshoot": 2.0, "peak_current": 1e3}, {"slip": 1.25}),
     ],
 )
 def test_what_simulations_show_short_is_tightened_by_as_much(changed, asked):
@@ -407,8 +402,11 @@ def test_tightened_demands_are_met_by_as_much_more(one):
 class Pretender(Seeker):
     """Hunts in a window of factors."""
 
-    def __init__(self, low, high, defaults):
-        self.low, self.high, self.defaults, self.tried = low, high, defaults, []
+    def __init__(self, low, high, parameters):
+        self.low, self.high, self.parameters, self.tried = low, high, parameters, []
+
+    def lowest(self, search):
+        return lowest_factor(self.parameters, search.corner.parameters)
 
     def hunts(self, search, factor):
         self.tried.append(factor)
@@ -419,19 +417,18 @@ class Pretender(Seeker):
 @pytest.mark.parametrize("width", [1.26, 1.6, 100.0])
 def test_the_first_factor_of_hunting_is_found(begins, width):
     # also where hunting ends again, because the motor is too weak to break away, and below what is demanded
-    values = {"gear.bearings.a.breakaway": 2.0, "gear.bearings.a.coulomb": 1.0}
-    seeker = Pretender(begins, begins * width, values)
+    seeker = Pretender(begins, begins * width, servo(coulomb=1.0, breakaway=2.0).system().parameters)
     found = StictionMargin("", **seeker(Search(Corner("", {}), {}, demand(stiction_margin=1.3))))
     assert found.rests < begins <= found.hunts <= ACCURACY * found.rests
     assert min(seeker.tried) >= 0.5
 
 
 def test_factors_that_are_tried_are_no_further_apart_than_a_step():
-    found = rungs(0.48, 1.3)
+    found = make_ladder(0.48, 1.3)
     assert found[0] == 0.48 and found[-1] == MOST
     assert {1.0, 1.3} <= set(found)
     assert max(b / a for a, b in pairwise(found)) <= 1.25 + 1e-12
-    assert rungs(1.0, 5.0)[-1] == 5.0
+    assert make_ladder(1.0, 5.0)[-1] == 5.0
 
 
 def test_a_margin_that_is_kept_is_that_of_the_demand_it_was_sought_for(one):
@@ -451,19 +448,18 @@ def test_a_margin_that_is_kept_is_that_of_the_demand_it_was_sought_for(one):
 
 
 def test_no_hunting_and_nothing_but_hunting():
-    values = {"gear.bearings.a.breakaway": 2.0, "gear.bearings.a.coulomb": 1.0}
-    search = Search(Corner("", {"gear.bearings.a.coulomb": 1.6}), {}, demand(stiction_margin=1.3))
+    values = servo(coulomb=1.0, breakaway=2.0).system().parameters
+    search = Search(Corner("", {"gear.bearings.shaft.coulomb": 1.6}), {}, demand(stiction_margin=1.3))
     never, always = (StictionMargin("", **Pretender(low, 1e3, values)(search)) for low in (99.0, 0.0))
     assert (never.rests, never.hunts) == (pytest.approx(MOST), None)
     assert (always.rests, always.hunts) == (None, pytest.approx(0.8))  # where breakaway is as large as sliding friction
-    assert "none up to factor 4" in never.words
-    assert "at the lowest factor too" in always.words
+    assert "none up to factor 4" in never.label
+    assert "already at the lowest factor" in always.label
     assert least_margin([never, always]) is always
 
 
 def test_least_factor_leaves_no_stiction(aileron):
-    values = {p.name: float(p.default) for p in aileron.system().parameters}
-    assert least(values) == pytest.approx(0.12 / 0.25)
+    assert lowest_factor(aileron.system().parameters, {}) == pytest.approx(0.12 / 0.25)
 
 
 # -- the optimum ------------------------------------------------------------------------------------------
@@ -523,8 +519,10 @@ def test_demands_that_exclude_each_other(one):
 
 
 def test_costs_in_words():
-    assert "1 deg more costs 1.76 %" in Active("phase margin at x", "", "", 1.0, "rad", 1.0).cost
-    assert "1 dB more costs 12.2 %" in Active("gain margin at x", "", "", 1.0, "-", 1.0).cost
+    assert (
+        "1 deg more costs 1.76 %" in Active(Criterion.PHASE_MARGIN, "phase margin at x", "", "", 1.0, "rad", 1.0).cost
+    )
+    assert "1 dB more costs 12.2 %" in Active(Criterion.GAIN_MARGIN, "gain margin at x", "", "", 1.0, "-", 1.0).cost
 
 
 # -- the whole study --------------------------------------------------------------------------------------
@@ -574,7 +572,7 @@ def test_dead_band_at_the_motor(aileron):
 def test_twins_are_corners_that_linear_models_cannot_tell_apart(one):
     modes = [corner_modes(for_linear_models(one), Corner(name, {}), 1.5, {}) for name in ("a", "b")]
     gains = dict(zip(GAINS, (20.0, 0.8, 8.0), strict=True))
-    assert twins_of([m for each in modes for m in measures(each, gains, demand(), {})]) == {"a": ["a", "b"]}
+    assert find_twins([m for each in modes for m in measures(each, gains, demand(), {})]) == {"a": ["a", "b"]}
 
 
 def test_report(tuned, tmp_path):
@@ -591,9 +589,9 @@ def test_report(tuned, tmp_path):
     assert result["met"]
     assert result["gains"]["tuned"][DEAD_BAND] > 0
     html = (tmp_path / "report.html").read_text()
-    assert "All demands met: margins and stiffness on the linear models" in html
-    assert "begin to hunt or not to decide" in html
-    assert "have failed or not settled: before at as it is</li>" in html  # and none after
+    assert "All demands are met in every corner: margins and stiffness on the linear models" in html
+    assert "hunting (or an undecided step) begins" in html
+    assert "failed or did not settle: before tuning at as it is</li>" in html  # and none after
     assert [row["corner"] for row in result["stiction_margins"]["tuned"]] == ["as it is", "less"]
     assert html.count("data:image/png;base64") == 4
 
@@ -653,7 +651,7 @@ def test_built_in_specification():
     [
         ("title = 'x'", "is missing"),
         ("[demand]\nbandwidth = -1", "bandwidth"),
-        ("[corners.a.b.factors]\n'gear.none.*' = 2", "no parameter fits 'gear.none"),
+        ("[corners.a.b.factors]\n'gear.none.*' = 2", "no parameter matches 'gear.none"),
     ],
 )
 def test_wrong_specifications_get_one_line(tmp_path, text, says):
@@ -685,14 +683,14 @@ def test_unknown_specification_and_help():
 
 def test_kept_results_survive_a_kill(tmp_path):
     path = tmp_path / "kept.jsonl"
-    kept = Kept(path)
-    kept["a"], kept["b"] = {"x": 1.0}, {"x": 2.0}
+    cache = Cache(path)
+    cache["a"], cache["b"] = {"x": 1.0}, {"x": 2.0}
     with path.open("a") as file:
         file.write('{"key": "c", "res')
-    again = Kept(path)
+    again = Cache(path)
     assert dict(again) == {"a": {"x": 1.0}, "b": {"x": 2.0}}
     again["c"] = {"x": 3.0}
-    assert Kept(path)["c"] == {"x": 3.0}
-    with pytest.raises(TypeError, match="not taken back"):
+    assert Cache(path)["c"] == {"x": 3.0}
+    with pytest.raises(TypeError, match="cannot be deleted one by one"):
         del again["a"]
     assert fingerprint({"b": 1, "a": 2.0}) == fingerprint({"a": 2.0, "b": 1}) != fingerprint({"a": 2.0, "b": 2})

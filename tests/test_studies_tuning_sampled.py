@@ -18,7 +18,8 @@ from actuator.linear.margins.lifted import lifted_margins
 from controllers import Cascade, Sampling
 from controllers.pid import PI, P
 from gear import Bearing, Shaft, Transmission
-from studies.specification import Corner, Demand, Specification, Tuning, load_specification
+from studies.corners import Corner
+from studies.specification import Demand, Specification, Tuning, load_specification
 from studies.tuning.check import check_corners
 from studies.tuning.loops import curves_at, gain_margin, phase_and_delay_margin
 from studies.tuning.measures import measures

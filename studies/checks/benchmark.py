@@ -1,4 +1,4 @@
-"""How fast is it? Figure 9 of the gear paper and the built-in cases, compiled and interpreted."""
+"""Benchmark of simulation: figure 9 of the gear paper and the built-in cases, compiled and interpreted."""
 
 import time as clock
 from collections.abc import Callable, Mapping
@@ -27,7 +27,7 @@ HEADER = f"{'case':<34}{'engine':<13}{'simulated':>10}{'wall':>11}{'events':>8}{
 def benchmark(runs: int, say: Callable[[str], None]) -> None:
     """Print the median wall time of `runs` simulations of each case, after one that builds and warms up.
 
-    What is timed is `simulate`: integration, event checks and outputs, without building and compiling.
+    `simulate` is timed: integration, event checks and outputs, without building and compiling.
     """
     say(HEADER)
     jobs: list[tuple[str, Actuator, float, Mapping[str, Signal], Mapping[str, float], float]] = []
@@ -52,11 +52,11 @@ def benchmark(runs: int, say: Callable[[str], None]) -> None:
             if compiled and plant.sampling is not None:
                 say(_shares(plant, timed[-1]))
     if not compiler():
-        say("no C compiler found: nothing was compiled")
+        say("no C compiler found: only interpreted runs")
 
 
 def _shares(plant: Actuator, run: Run) -> str:
-    """Where the time of a compiled run with sampled control goes, in a line: each function timed by itself."""
+    """Breakdown of the time of a compiled run with sampled control, in a line; each function timed separately."""
     system = plant.system()
     assert system.tick is not None
     x = np.array([run[state.name] for state in system.states])[:, :BLOCK]
@@ -70,13 +70,13 @@ def _shares(plant: Actuator, run: Run) -> str:
         "margins at outputs": points * _seconds(system.margins, [x, modes, *same]),
     }
     wall = run.statistics.wall_s
-    spent["integration, events and the rest"] = wall - sum(spent.values())
+    spent["integration, events and other"] = wall - sum(spent.values())
     parts = ", ".join(f"{name} {part / wall:.0%}" for name, part in spent.items())
     return f"    {1e6 * wall / ticks:.1f} us a tick: {parts}"
 
 
 def _seconds(function: ca.Function, arguments: list[np.ndarray]) -> float:
-    """Of one evaluation of a compiled function, on columns of arguments."""
+    """Time of one evaluation of a compiled function, on columns of arguments."""
     mapped = compile_function(function.map(arguments[0].shape[1]))
     assert mapped is not None
     times = []

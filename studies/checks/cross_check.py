@@ -1,7 +1,7 @@
-"""Does this project find the numbers that others found for the same machines: Dymola's and motulator's.
+"""Comparison with results that other programs, Dymola and motulator, gave for the same machines.
 
-What is compared, and how it was built here, stands in `cross_check_actuator` and `cross_check_drive`.
-Parts of both published results are stored with the study; with a folder that holds the whole, the whole is compared.
+What is compared, and how it was built here, is described in `cross_check_actuator` and `cross_check_drive`.
+Excerpts of both published results come with the study; given a folder with the complete results, those are compared.
 """
 
 import hashlib
@@ -9,12 +9,13 @@ from collections.abc import Callable, MutableMapping
 from pathlib import Path
 from typing import NamedTuple
 
-from studies.cache import Stages, fingerprint
+from studies.cache import Steps, fingerprint
 from studies.checks.cross_check_actuator import Recorded as RecordedRod
 from studies.checks.cross_check_actuator import check_actuator
-from studies.checks.cross_check_actuator import recorded as recorded_rod
+from studies.checks.cross_check_actuator import recorded as read_rod
 from studies.checks.cross_check_drive import check_drive
-from studies.checks.cross_check_record import Recorded, WrongRecord, recorded
+from studies.checks.cross_check_record import Recorded, WrongRecord
+from studies.checks.cross_check_record import recorded as read_drive
 from studies.checks.deviation import Deviation, table
 from studies.findings import Findings, png
 
@@ -23,7 +24,7 @@ SHARE = 0.9  # of the time that the actuator takes
 
 
 class Checked(NamedTuple):
-    """One of the comparisons."""
+    """The result of one comparison."""
 
     rows: list[Deviation]
     pictures: dict[str, bytes]
@@ -31,7 +32,7 @@ class Checked(NamedTuple):
 
 
 class Records(NamedTuple):
-    """The published results, and a fingerprint of the files that they are from."""
+    """The published results, whether they are complete, and a fingerprint of their files."""
 
     rod: RecordedRod
     drive: Recorded
@@ -39,8 +40,8 @@ class Records(NamedTuple):
     source: str
 
 
-def records_of(folder: Path | None = None) -> Records:
-    """From a folder that holds the whole results, or where none is given the parts of them that are stored here.
+def read_records(folder: Path | None = None) -> Records:
+    """Read the published results: the complete ones in a folder, by default the excerpts of this package.
 
     Raises
     ------
@@ -48,22 +49,24 @@ def records_of(folder: Path | None = None) -> Records:
         Where the folder lacks one of the two results, or a result a column.
     """
     if folder is None:
-        return Records(recorded_rod(), recorded(), False, "")
+        return Records(read_rod(), read_drive(), False, "")
     paths = [_find(folder, name) for name in (ACTUATOR_FILE, DRIVE_FILE)]
-    source = fingerprint([hashlib.sha256(path.read_bytes()).hexdigest() for path in paths])
-    return Records(recorded_rod(paths[0]), recorded(paths[1]), True, source)
+    source = fingerprint(*(hashlib.sha256(path.read_bytes()).hexdigest() for path in paths))
+    return Records(read_rod(paths[0]), read_drive(paths[1]), True, source)
 
 
-def cross_check(progress: Callable[[float], None], records: Records, kept: MutableMapping | None = None) -> Findings:
-    """Both comparisons; `progress` is called with the share that is done, and what is finished is `kept`."""
-    stages = Stages(kept, records.source)
+def run_cross_check(
+    progress: Callable[[float], None], records: Records, cache: MutableMapping | None = None
+) -> Findings:
+    """Both comparisons; `progress` is called with the share that is done."""
+    steps = Steps(cache, records.source)
 
     def actuator() -> Checked:
         check = check_actuator(records.rod, lambda share: progress(SHARE * share))
         sentence = (
-            f"Dymola spent 2.73 s on the actuator's 8 s with noise; when they were computed here they took "
+            f"Dymola took 2.73 s for the 8 s of the actuator with noise; here they took "
             f"{check.noisy.statistics.wall_s:.2f} s ({len(check.noisy.changes)} changes of modes), and "
-            f"{check.clean.statistics.wall_s:.2f} s without."
+            f"{check.clean.statistics.wall_s:.2f} s without noise."
         )
         return Checked(check.rows(), {"cross_check_actuator": png(check.picture())}, [sentence])
 
@@ -72,21 +75,22 @@ def cross_check(progress: Callable[[float], None], records: Records, kept: Mutab
         pictures = {"cross_check_machine": check.machine_picture(), "cross_check_drive": check.drive_picture()}
         return Checked(check.rows(), {name: png(figure) for name, figure in pictures.items()}, [])
 
-    found = [stages.get("Dymola's actuator", Checked, actuator)]
+    found = [steps.compute("Dymola's actuator", Checked, actuator)]
     progress(SHARE)
-    found.append(stages.get("motulator's drive", Checked, drive))
+    found.append(steps.compute("motulator's drive", Checked, drive))
     progress(1.0)
     rows = [row for each in found for row in each.rows]
     text = [
         table(rows),
-        f"All within what is allowed: {'yes' if all(row.holds for row in rows) else 'NO'}. "
-        "Signals are compared at every output, over their peak or the travel; the drive's marks over themselves.",
+        f"All within their limits: {'yes' if all(row.holds for row in rows) else 'NO'}. Signals are compared at every "
+        "output point, relative to their peak or to the travel; the drive's key figures relative to themselves.",
         *(sentence for each in found for sentence in each.text),
     ]
     return Findings(
         pictures={name: picture for each in found for name, picture in each.pictures.items()},
         result={"deviations": [row.as_result() for row in rows], "whole": records.whole},
         text=text,
+        passed=all(row.holds for row in rows),
     )
 
 
@@ -96,6 +100,6 @@ def _find(folder: Path, name: str) -> Path:
     if not found:
         raise WrongRecord(
             f"no {name} in {folder} or below; give a folder with {ACTUATOR_FILE} and {DRIVE_FILE}, or none to compare "
-            "with what is stored here"
+            "with the excerpts of this package"
         )
     return found[0]

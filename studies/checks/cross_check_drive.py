@@ -31,8 +31,8 @@ from studies.checks.cross_check_record import (
     SIGNALS,
     SPEED,
     SPEED_TIME,
+    Excerpt,
     Recorded,
-    Stretch,
     marks,
 )
 from studies.checks.deviation import Deviation
@@ -81,11 +81,11 @@ def _one_period() -> ca.Function:
     return ca.Function("one_period", [x, u], [after])
 
 
-def driven_machine(stretch: Stretch) -> dict[str, np.ndarray]:
+def driven_machine(excerpt: Excerpt) -> dict[str, np.ndarray]:
     """What the machine does with the recorded duty ratios and load torque, at the known samples."""
-    inputs = np.vstack([stretch.duties, stretch.load])
-    states = _one_period().mapaccum(inputs.shape[1])(stretch.start, inputs).full()
-    direct, quadrature, speed, _ = np.column_stack([stretch.start, states])[:, stretch.samples]
+    inputs = np.vstack([excerpt.duties, excerpt.load])
+    states = _one_period().mapaccum(inputs.shape[1])(excerpt.start, inputs).full()
+    direct, quadrature, speed, _ = np.column_stack([excerpt.start, states])[:, excerpt.samples]
     torque = np.array([float(MOTOR.torque([d, q])) for d, q in zip(direct, quadrature, strict=True)])
     return dict(zip(SIGNALS, (direct, quadrature, torque, speed), strict=True))
 
@@ -146,7 +146,7 @@ class DriveCheck(NamedTuple):
     """The machine on recorded voltages, and the drive, beside the other's."""
 
     theirs: Recorded
-    machine: list[dict[str, np.ndarray]]  # per stretch
+    machine: list[dict[str, np.ndarray]]  # per excerpt
     run: Run
 
     def rows(self) -> list[Deviation]:
@@ -174,21 +174,20 @@ class DriveCheck(NamedTuple):
         ]
 
     def _count(self) -> int:
-        return sum(len(stretch.samples) for stretch in self.theirs.stretches)
+        return sum(len(excerpt.samples) for excerpt in self.theirs.excerpts)
 
     def _errors(self, name: str) -> list[np.ndarray]:
         return [
-            ours[name] - stretch.signals[name]
-            for ours, stretch in zip(self.machine, self.theirs.stretches, strict=True)
+            ours[name] - excerpt.signals[name] for ours, excerpt in zip(self.machine, self.theirs.excerpts, strict=True)
         ]
 
     def machine_picture(self) -> Figure:
-        """Per stretch the signals over their peaks, and the deviations."""
-        stretches = self.theirs.stretches
+        """Per excerpt the signals over their peaks, and the deviations."""
+        excerpts = self.theirs.excerpts
         figure = Figure(figsize=(9, 6), layout="constrained")
-        panels = figure.subplots(2, len(stretches), sharex="col", sharey="row", squeeze=False)
-        for k, stretch in enumerate(stretches):
-            time = 1e3 * (stretch.begin + PERIOD * stretch.samples)
+        panels = figure.subplots(2, len(excerpts), sharex="col", sharey="row", squeeze=False)
+        for k, excerpt in enumerate(excerpts):
+            time = 1e3 * (excerpt.begin + PERIOD * excerpt.samples)
             above, below = panels[:, k]
             for (name, peak), color in zip(self.theirs.peaks.items(), COLORS, strict=True):
                 above.plot(
@@ -196,7 +195,7 @@ class DriveCheck(NamedTuple):
                 )
                 few = slice(None, None, max(1, len(time) // 80))
                 above.plot(
-                    time[few], stretch.signals[name][few] / peak, "o", color=color, markersize=3, fillstyle="none"
+                    time[few], excerpt.signals[name][few] / peak, "o", color=color, markersize=3, fillstyle="none"
                 )
                 below.plot(time, 1e6 * self._errors(name)[k] / peak, color=color, label=_words(name))
             below.set_xlabel("time in ms")
@@ -249,4 +248,4 @@ def _words(name: str) -> str:
 
 def check_drive(theirs: Recorded) -> DriveCheck:
     """The machine on recorded voltages, and the drive."""
-    return DriveCheck(theirs, [driven_machine(stretch) for stretch in theirs.stretches], move())
+    return DriveCheck(theirs, [driven_machine(excerpt) for excerpt in theirs.excerpts], move())

@@ -1,4 +1,4 @@
-"""The run of a 2.2 kW PMSM drive by motulator, as it is published or in the parts that are stored here."""
+"""The published run of a 2.2 kW PMSM drive in motulator, complete or as the excerpts of this package."""
 
 import json
 from collections.abc import Sequence
@@ -7,6 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from studies.files import StudyError
+
 DATA = Path(__file__).parent.parent / "data" / "cross_check_drive.json"
 PERIOD = 125e-6  # s
 SPEED, SPEED_TIME = 50 * np.pi, 0.2  # rad/s of the rotor, at 75 Hz with 3 pole pairs; s
@@ -14,11 +16,11 @@ LOAD, LOAD_TIME = 14.0, 0.6  # N m, s
 SIGNALS = {"current_d": "A", "current_q": "A", "torque": "N m", "speed": "rad/s"}
 
 
-class WrongRecord(Exception):
-    """A published result that is not where it should be, or not what it should be."""
+class WrongRecord(StudyError):
+    """A published result that is missing, or is not in the expected form."""
 
 
-class Stretch(NamedTuple):
+class Excerpt(NamedTuple):
     """Part of the recorded run, at which the machine is held against it."""
 
     start: np.ndarray  # (4,) direct and quadrature current [A], speed [rad/s] and angle [rad] of the rotor
@@ -30,9 +32,9 @@ class Stretch(NamedTuple):
 
 
 class Recorded(NamedTuple):
-    """The other's run."""
+    """The published run."""
 
-    stretches: list[Stretch]
+    excerpts: list[Excerpt]
     peaks: dict[str, float]  # of the whole run, by the names of SIGNALS
     marks: dict[str, float]
     time: np.ndarray  # (n,) of the curves [s]
@@ -40,7 +42,7 @@ class Recorded(NamedTuple):
 
 
 def marks(time: np.ndarray, signals: dict[str, np.ndarray]) -> dict[str, float]:
-    """What a drive is known by: peak current, speed dip behind the load step, settled currents."""
+    """Key figures of a drive: peak current, speed dip after the load step, settled currents."""
     size = np.hypot(signals["current_d"], signals["current_q"])
     return {
         "peak current": float(size.max()),
@@ -51,18 +53,18 @@ def marks(time: np.ndarray, signals: dict[str, np.ndarray]) -> dict[str, float]:
 
 
 def recorded(npz: Path | None = None) -> Recorded:
-    """From a whole record, one sample a period, or where none is given the parts of it that are stored here."""
+    """Read a complete record, one sample a period; by default the excerpts of this package."""
     if npz is None:
         stored = json.loads(DATA.read_text(encoding="utf-8"))
-        stretches = [_stored(one) for one in stored["stretches"]]
+        excerpts = [_stored(one) for one in stored["stretches"]]
         time, *curves = (np.array(row) for row in stored["curves"])
-        return Recorded(stretches, stored["peaks"], stored["marks"], time, dict(zip(SIGNALS, curves, strict=True)))
+        return Recorded(excerpts, stored["peaks"], stored["marks"], time, dict(zip(SIGNALS, curves, strict=True)))
     with np.load(npz) as record:
         require_columns(npz, ("t", "i_d", "i_q", "tau_M", "w_M", "tau_L", "d_a", "d_b", "d_c"), record.files)
         time = record["t"]
         signals = {name: record[key] for name, key in zip(SIGNALS, ("i_d", "i_q", "tau_M", "w_M"), strict=True)}
         duties = np.array([record[f"d_{phase}"] for phase in "abc"])[:, :-2]
-        whole = Stretch(
+        whole = Excerpt(
             start=np.zeros(4),
             duties=np.column_stack([np.full(3, 0.5), duties]),
             load=record["tau_L"][1:],
@@ -81,9 +83,9 @@ def require_columns(path: Path, needed: Sequence[str], there: Sequence[str]) -> 
             raise WrongRecord(f"{path} has no column {name!r}, only {', '.join(there)}; is it the published result?")
 
 
-def _stored(one: dict[str, Any]) -> Stretch:
+def _stored(one: dict[str, Any]) -> Excerpt:
     duties = np.array(one["duties"])
     count = duties.shape[1]
     samples = np.arange(0, count + 1, one["every"])
     signals = dict(zip(SIGNALS, (np.array(row) for row in one["signals"]), strict=True))
-    return Stretch(np.array(one["start"]), duties, np.full(count, one["load"]), samples, signals, one["begin"])
+    return Excerpt(np.array(one["start"]), duties, np.full(count, one["load"]), samples, signals, one["begin"])

@@ -1,10 +1,10 @@
-"""How far this project's numbers are from those of others, as rows of a table."""
+"""Deviations of this project's numbers from published ones, as rows of a table."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-HEADINGS = ("", "theirs", "deviation", "relative", "allowed", "")
+HEADINGS = ("", "reference", "deviation", "relative", "limit", "")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,11 +18,11 @@ class Deviation:
     unit : str
         Of both numbers.
     theirs : float
-        The other's number; for a signal over time its peak.
+        The published number; for a signal over time its peak.
     deviation : float
         This project's number less theirs; for a signal over time the largest, without its sign.
     allowed : float
-        Largest share of theirs [-].
+        Limit of the relative deviation [-].
     """
 
     what: str
@@ -33,21 +33,21 @@ class Deviation:
 
     @property
     def relative(self) -> float:
-        """Size of the deviation over theirs [-]."""
+        """Magnitude of the deviation over the published number [-]."""
         return abs(self.deviation / self.theirs)
 
     @property
     def holds(self) -> bool:
-        """Whether it is within what is allowed."""
+        """Whether it is within its limit."""
         return self.relative <= self.allowed
 
     def as_result(self) -> dict[str, Any]:
-        """For machines."""
+        """As a dictionary, for result.json."""
         return {**asdict(self), "relative": self.relative, "holds": self.holds}
 
 
 def table(rows: Sequence[Deviation]) -> str:
-    """The rows as text in columns."""
+    """Format the rows as text in columns."""
     cells = [
         (
             row.what,
@@ -55,7 +55,7 @@ def table(rows: Sequence[Deviation]) -> str:
             f"{row.deviation:.2g} {row.unit}",
             f"{100 * row.relative:.2g} %",
             f"{100 * row.allowed:g} %",
-            "" if row.holds else "TOO FAR",
+            "" if row.holds else "EXCEEDED",
         )
         for row in rows
     ]

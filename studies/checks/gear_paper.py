@@ -1,9 +1,9 @@
-"""Does the gear model give the gear paper's results: figures 7, 9, 12, 13 and the cold gearbox.
+"""The gear paper's results from the gear model: figures 7, 9, 12, 13 and the cold gearbox.
 
 F. L. J. van der Linden, "Modeling of geared positioning systems: an object oriented gear contact model with
 validation". Its figures 7 (elasticity laws), 9 (stick-slip under preload), 12 and 13 (deformation, stiffness
 and friction torque on the test rig, four quadrants), and its sentence on gears at -55 degC as a worked
-example. What the paper prints as a number is compared; what it only draws is drawn beside it, and said so.
+example. Numbers printed in the paper are compared; for curves that it only draws the report says so.
 """
 
 from collections.abc import Callable, MutableMapping
@@ -37,7 +37,7 @@ from gear.efficiency import efficiency
 from gear.elasticity.law import AT_REST
 from gear.friction.tabulated_efficiency import EfficiencyPoint
 from gear.motion import Sliding
-from studies.cache import Stages
+from studies.cache import Steps
 from studies.checks.paper import figure_9, figure_9_inputs, figure_9_start
 from studies.findings import Findings, png
 
@@ -65,19 +65,19 @@ QUADRANTS = {(1, 1): 1, (1, -1): 2, (-1, 1): 3, (-1, -1): 4}  # (sign of v, sign
 
 @dataclass(frozen=True, kw_only=True)
 class Figures:
-    """Pictures (PNG) by file name, numbers, and sentences on what could be compared."""
+    """Pictures (PNG) by file name, numbers, and sentences on the comparison."""
 
     pictures: dict[str, bytes]
     result: dict[str, Any]
     text: list[str]
 
 
-def gear_paper(progress: Callable[[float], None], kept: MutableMapping | None = None) -> Findings:
-    """All figures; `progress` is called with the share that is done, and what is finished is `kept`."""
-    stages, found = Stages(kept), []
+def run_gear_paper(progress: Callable[[float], None], cache: MutableMapping | None = None) -> Findings:
+    """All figures; `progress` is called with the share that is done."""
+    steps, found = Steps(cache), []
     parts = (figure_7, figure_9_with_din, figures_12_and_13, cold_gearbox)
     for k, part in enumerate(parts):
-        found.append(stages.get(part.__name__.replace("_", " "), Figures, part))
+        found.append(steps.compute(part.__name__.replace("_", " "), Figures, part))
         progress((k + 1) / len(parts))
     return Findings(
         pictures={name: figure for each in found for name, figure in each.pictures.items()},
@@ -108,7 +108,7 @@ def figure_7() -> Figures:
         axes.grid(alpha=0.3)
     panels[0].legend(fontsize="x-small")
     result = {str(law): float(data["force"].sel(law=law)[-1]) for law in data.law.values}
-    text = ["Figure 7: the laws are drawn over the same axes; the paper prints no numbers for its curves."]
+    text = ["Figure 7: the laws are plotted over the same axes; the paper prints no numbers for its curves."]
     return Figures(pictures={"figure_7": png(figure)}, result={"figure_7_force_at_20_um_N": result}, text=text)
 
 
@@ -142,16 +142,16 @@ def figure_9_with_din() -> Figures:
     pictures["figure_9_coulomb"] = png(plot_run(plain, ["motor_angle", "load_angle"]))
     result["coulomb, printed"] = _stick_slip(plain)
     text = [
-        "Figure 9: the paper prints neither times nor angles, and neither the load spring nor the face width that its "
+        "Figure 9: the paper prints no times or angles, and neither the load spring nor the face width that its "
         f"friction law needs; 1000 N m/rad and {1e3 * FACE_WIDTH:g} mm are assumed. With Coulomb friction and the "
         f"printed lever arms the gear slips {result['coulomb, printed']['slips']} times and is stuck for "
-        f"{result['coulomb, printed']['stuck_share']:.0%} of the time, as in the figure in kind.",
-        "With DIN 3990-4 capped by the static coefficient at all speeds (without the cap a breakaway would raise "
-        f"friction) it lets go {result['printed']['slips']} and {result['geometric']['slips']} times with printed "
+        f"{result['coulomb, printed']['stuck_share']:.0%} of the time, qualitatively as in the figure.",
+        "With DIN 3990-4 capped by the static coefficient at all speeds (without the cap friction would rise at "
+        f"breakaway) it breaks away {result['printed']['slips']} and {result['geometric']['slips']} times with printed "
         f"and geometric lever arms and is stuck for {result['printed']['stuck_share']:.0%} and "
-        f"{result['geometric']['stuck_share']:.0%} of the time: where the slip stays slow, the law gives no drop of "
-        "friction that could stop it again.",
-        f"The paper's 0.19 s of computing for these 10 s compare with {result['coulomb, printed']['wall_s']:.3f} s "
+        f"{result['geometric']['stuck_share']:.0%} of the time: while the slip is slow, friction does not drop with "
+        "speed, so nothing stops the motion again.",
+        f"Computing time for these 10 s: 0.19 s in the paper, {result['coulomb, printed']['wall_s']:.3f} s "
         f"({'compiled' if plain.statistics.compiled else 'interpreted'}) here.",
     ]
     return Figures(pictures=pictures, result={"figure_9": result}, text=text)
@@ -199,7 +199,7 @@ def figures_12_and_13() -> Figures:
         train = deflection + normal / RIG["train stiffness"]
         slope = np.concatenate([np.gradient(normal[side], deflection[side]) for side in FLANKS])
         label = f"{sign * RIG['speed']:+g} rad/s"
-        for side in FLANKS:  # each by itself: there is nothing between them but the gap
+        for side in FLANKS:  # separately: between them is only the gap
             x, words = normal[side], label if side == FLANKS[0] else ""
             for axes, y, line, what in (
                 (deformation, 1e6 * deflection, style, ", mesh"),
@@ -223,10 +223,11 @@ def figures_12_and_13() -> Figures:
         place = (flank * 300, speed * 0.02)
         torque.annotate(f"quadrant {quadrant}", place, ha="center", color="#8c8c8c", fontsize="small")
     text = [
-        "Figures 12 and 13: the paper prints how far its simulation is from its measurement (10 um and 0.09 N m at "
-        "most, 3.4 um and 0.023 N m on average) but none of the curves, so only the no-load friction can be compared: "
-        f"{abs(next(iter(result['no_load_friction_Nm'].values()))):.3f} N m here near zero load, 0.05 N m there "
-        "(its text also says 0.5 N m, a misprint).",
+        "Figures 12 and 13: the paper prints the errors of its simulation against its measurement (at most 10 um and "
+        "0.09 N m, on average 3.4 um and 0.023 N m) but no values of the curves, so only the no-load friction can be "
+        "compared: "
+        f"{abs(next(iter(result['no_load_friction_Nm'].values()))):.3f} N m here near zero load, 0.05 N m in "
+        "the paper (its text also says 0.5 N m, a misprint).",
         "The face width and the train stiffness are not printed; 10 mm and 20 N/um are assumed.",
     ]
     pictures = {"figure_12": png(bend), "figure_13": png(loss)}
@@ -257,7 +258,7 @@ def cold_gearbox() -> Figures:
         input="wheel_a",
         output="wheel_b",
     )
-    # the seals hold what half the stall load, driving the gear backward, still is on wheel A
+    # the seals hold the torque that half the stall load, back-driving the gear, gives on wheel A
     seals = abs(balance(bare, output_torque=stall / 2, output_speed=speed, friction="static").input_torque)
     cold = replace(bare, bearings={"seals": Bearing(shaft="wheel_a", coulomb=0.0, breakaway=seals)})
     start = breakout(cold, torque=1e-6)
@@ -271,9 +272,9 @@ def cold_gearbox() -> Figures:
         "breakout_over_stall": start.output_torque / stall,
     }
     text = [
-        f"Gears at -55 degC: an efficiency of 85 % from this one mesh needs a coefficient of friction of "
-        f"{result['coefficient_of_friction']:.2f}; it is that of a whole cold gearbox, seals and bearings included. "
-        f"With seals that break away at {seals:.3g} N m on wheel A the gear is driven backward from "
-        f"{100 * result['breakout_over_stall']:.0f} % of the stall load on."
+        f"Gears at -55 degC: an efficiency of 85 % in this one mesh requires a coefficient of friction of "
+        f"{result['coefficient_of_friction']:.2f}, which stands for a whole cold gearbox with seals and bearings. With "
+        f"seals that break away at {seals:.3g} N m on wheel A the gear can be back-driven from "
+        f"{100 * result['breakout_over_stall']:.0f} % of the stall load."
     ]
     return Figures(pictures={}, result={"cold_gearbox": result}, text=text)

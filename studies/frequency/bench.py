@@ -1,4 +1,4 @@
-"""Bench tests of the frequency-response study, by name: each an outcome of numbers and a picture that can be kept."""
+"""Bench tests of the frequency-response study by name, each with numbers and a picture that can be cached."""
 
 import base64
 import math
@@ -29,8 +29,7 @@ from studies.findings import png
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SMALLEST = 1e-5  # of the stroke, from which the threshold is sought
-LARGEST = 0.5  # of the stroke, up to which it is
+SMALLEST, LARGEST = 1e-5, 0.5  # of the stroke, between which the threshold is sought
 PLAY = 0.5  # of the largest torque, in the test of free play
 CORNERS = "every corner"  # the one test that depends on them
 INCREMENT = 5e-4  # of the stroke, in the staircase
@@ -38,7 +37,7 @@ INCREMENT = 5e-4  # of the stroke, in the staircase
 
 @dataclass(frozen=True, kw_only=True)
 class BenchPlan:
-    """What the tests need to know besides the actuator.
+    """Settings of the tests, besides the actuator.
 
     Parameters
     ----------
@@ -62,13 +61,13 @@ class BenchPlan:
 
 
 class BenchWork:
-    """The work of `run_many`: from the name of a test to what came of it."""
+    """The work of `run_many`: from the name of a test to its result."""
 
     def __init__(self, actuator: Actuator, plan: BenchPlan) -> None:
         self.actuator, self.plan = actuator, plan
 
     def __call__(self, name: str) -> dict[str, Any]:
-        """Numbers with units by name, what is found in words, the picture as PNG in base64; and why there is none."""
+        """Numbers with units by name, a text, the picture as PNG in base64, and the reason where there is none."""
         try:
             found = TESTS[name](self.actuator, self.plan)
         except (ValueError, SimulationError) as error:
@@ -77,8 +76,8 @@ class BenchWork:
         return {"numbers": found.numbers, "words": found.words, "picture": picture, "reason": ""}
 
 
-class Found(NamedTuple):
-    """What comes of a test."""
+class BenchResult(NamedTuple):
+    """The result of a test."""
 
     numbers: Numbers
     figure: "Figure | None"
@@ -89,67 +88,68 @@ def _bench(actuator: Actuator, plan: BenchPlan) -> Bench:
     return Bench(plant=actuator, stroke=plan.stroke, inputs=plan.inputs)
 
 
-def _drawn(test: Any) -> Found:
-    return Found(test.numbers, test.plot())
+def _plotted(test: Any) -> BenchResult:
+    return BenchResult(test.numbers, test.plot())
 
 
-def _hold(actuator: Actuator, plan: BenchPlan) -> Found:
+def _hold(actuator: Actuator, plan: BenchPlan) -> BenchResult:
     test = hold_test(_bench(actuator, plan))
-    return Found(test.numbers, test.plot(), f"{test.verdict.verdict} ({test.verdict.reason})")
+    return BenchResult(test.numbers, test.plot(), f"{test.verdict.verdict} ({test.verdict.reason})")
 
 
-def _threshold(actuator: Actuator, plan: BenchPlan) -> Found:
+def _threshold(actuator: Actuator, plan: BenchPlan) -> BenchResult:
     stream = SineStream(plant=actuator)
     found: Numbers = {}
     for frequency in plan.frequencies:
         point = SinePoint(amplitude=1.0, frequency=frequency, inputs=plan.inputs)
         value = stream.threshold(point, SMALLEST * plan.stroke, LARGEST * plan.stroke, accuracy=1e-2)
         found[f"threshold at {frequency:.3g} Hz"] = (value, "rad")
-    return Found(found, None)
+    return BenchResult(found, None)
 
 
-def _free_play(actuator: Actuator, plan: BenchPlan) -> Found:
+def _free_play(actuator: Actuator, plan: BenchPlan) -> BenchResult:
     found = free_play(locked(actuator), torque=PLAY * plan.torque, inputs=_of_load(plan))
     numbers = {
         "free play": (found.width_rad, "rad"),
         "lost motion": (found.lost_motion_rad, "rad"),
         "stiffness of the gear": (found.stiffness, "N m/rad"),
     }
-    return Found(numbers, found.plot())
+    return BenchResult(numbers, found.plot())
 
 
-def _back_driving(actuator: Actuator, plan: BenchPlan) -> Found:
+def _back_driving(actuator: Actuator, plan: BenchPlan) -> BenchResult:
     found: Numbers = {}
-    figure, locked_ways = None, []
+    figure, locked_directions = None, []
     for word, sign in (("forward", 1), ("backward", -1)):
         test = back_driving(unpowered(actuator), highest=sign * plan.torque, inputs=_of_load(plan))
-        found[f"torque that drives back, {word}"] = (math.inf if test.locks else test.torque, "N m")
+        found[f"back-driving torque, {word}"] = (math.inf if test.locks else test.torque, "N m")
         figure = figure or test.plot()
-        locked_ways += [word] if test.locks else []
-    words = f"{' and '.join(locked_ways)} none was found up to {plan.torque:.4g} N m" if locked_ways else ""
-    return Found(found, figure, words)
+        locked_directions += [word] if test.locks else []
+    directions = " and ".join(locked_directions)
+    words = f"not back-driven {directions} up to {plan.torque:.4g} N m" if directions else ""
+    return BenchResult(found, figure, words)
 
 
-def _soak(actuator: Actuator, plan: BenchPlan) -> Found:
+def _soak(actuator: Actuator, plan: BenchPlan) -> BenchResult:
     if len(plan.sets) == 1:
-        raise ValueError("there is no corner but the actuator as it is; name others with --corner")
-    return _drawn(soak_test(_bench(actuator, plan), plan.sets))
+        raise ValueError("the only corner is the actuator as it is; give others with --corner")
+    return _plotted(soak_test(_bench(actuator, plan), plan.sets))
 
 
 def _of_load(plan: BenchPlan) -> dict[str, float]:
-    """The inputs that an actuator without motor and controller still has."""
+    """The inputs that remain without motor and controller."""
     return {name: value for name, value in plan.inputs.items() if name == "load_torque"}
 
 
-TESTS: dict[str, Callable[[Actuator, BenchPlan], Found]] = {
+TESTS: dict[str, Callable[[Actuator, BenchPlan], BenchResult]] = {
     "threshold": _threshold,
-    "step": lambda actuator, plan: _drawn(step_test(_bench(actuator, plan))),
-    "slow triangle": lambda actuator, plan: _drawn(triangle_test(_bench(actuator, plan))),
-    "staircase": lambda actuator, plan: _drawn(
+    "step": lambda actuator, plan: _plotted(step_test(_bench(actuator, plan))),
+    "slow triangle": lambda actuator, plan: _plotted(triangle_test(_bench(actuator, plan))),
+    "staircase": lambda actuator, plan: _plotted(
         staircase_test(_bench(actuator, plan), increment=INCREMENT * plan.stroke)
     ),
     "hold": _hold,
-    "rate and stall": lambda actuator, plan: _drawn(rate_test(_bench(actuator, plan), highest=2 * plan.torque)),
+    "rate and stall": lambda actuator, plan: _plotted(rate_test(_bench(actuator, plan), highest=2 * plan.torque)),
     CORNERS: _soak,
     "free play": _free_play,
     "back driving": _back_driving,

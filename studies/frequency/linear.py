@@ -17,8 +17,8 @@ from actuator import (
     poles,
 )
 from actuator.linear.margins.sensitivity import Peak, Sensitivities, peak_of, sensitivities
-from actuator.system.builder import PREFIX
-from studies.frequency.corners import Place
+from gear.quantities.roles import LoopSignal
+from studies.frequency.plan import Place
 
 OUTPUT = "load_angle"
 LOAD = "load_torque"
@@ -26,7 +26,7 @@ LOAD = "load_torque"
 
 @dataclass(frozen=True, kw_only=True)
 class LinearPart:
-    """The linear models in every mode that can be reached.
+    """The linear models in every reachable mode.
 
     Attributes
     ----------
@@ -35,12 +35,12 @@ class LinearPart:
     closed, compliance : mapping of str to StateSpace
         Load angle over reference and over load torque, all loops closed, by mode.
     loops : mapping of str to mapping of str to StateSpace
-        By the signal at which they are opened, then by mode.
+        By the signal at which the loop is opened, then by mode.
     margins : mapping of str to mapping of str to Margins or LiftedMargins
-        Of them.
+        Of these loops.
     sensitivities : mapping of str to mapping of str to Sensitivities or None
-        Likewise; None where nothing passes.
-    yields : mapping of str to Peak
+        Likewise; None where the loop gain is zero.
+    compliance_peaks : mapping of str to Peak
         Largest compliance by mode [rad/(N m)].
     poles : mapping of str to Poles
         By mode.
@@ -54,7 +54,7 @@ class LinearPart:
     loops: Mapping[str, Mapping[str, control.StateSpace]] = field(repr=False)
     margins: Mapping[str, Mapping[str, Margins | LiftedMargins]]
     sensitivities: Mapping[str, Mapping[str, Sensitivities | None]] = field(repr=False)
-    yields: Mapping[str, Peak]
+    compliance_peaks: Mapping[str, Peak]
     poles: Mapping[str, Poles]
     missing: Mapping[str, str]
 
@@ -70,13 +70,12 @@ def linear_part(actuator: Actuator, inputs: Mapping[str, float]) -> LinearPart:
     models = mode_models(actuator, inputs=inputs)
     loops: dict[str, Mapping[str, control.StateSpace]] = {}
     missing: dict[str, str] = {}
-    for name in (quantity.name for quantity in models.models[0].point.system.inputs):
-        if name.startswith(PREFIX):
-            at = name.removeprefix(PREFIX)
+    for quantity in models.models[0].point.system.inputs:
+        if role := quantity.role(LoopSignal):
             try:
-                loops[at] = models.loops(at)
+                loops[role.signal] = models.loops(role.signal)
             except ValueError as error:  # a signal that is not held between the ticks of its clock
-                missing[at] = str(error)
+                missing[role.signal] = str(error)
     compliance = models.responses(LOAD, OUTPUT)
     return LinearPart(
         models=models,
@@ -87,7 +86,7 @@ def linear_part(actuator: Actuator, inputs: Mapping[str, float]) -> LinearPart:
         sensitivities={
             at: {mode: sensitivities(loop) for mode, loop in opened.items()} for at, opened in loops.items()
         },
-        yields={mode: peak_of(model) for mode, model in compliance.items()},
+        compliance_peaks={mode: peak_of(model) for mode, model in compliance.items()},
         poles={model.name: poles(model.point, drifting=model.drifting) for model in models},
         missing=missing,
     )

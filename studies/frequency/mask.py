@@ -1,11 +1,11 @@
-"""Limits on gain and phase over frequency, at stated amplitudes, and whether a measured response keeps to them."""
+"""Limits on gain and phase over frequency, at stated amplitudes, and their check against a measured response."""
 
 import math
 from dataclasses import dataclass
 from importlib import resources
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from annotated_types import Unit
@@ -20,14 +20,32 @@ Radian = Annotated[float, Unit("rad")]
 LARGEST = 0.5  # of the stroke: from the middle to an end
 
 
+class Side(NamedTuple):
+    """One side of a limit: what it bounds, whether from below (1) or above (-1), and how it is shown."""
+
+    quantity: Literal["gain", "phase"]
+    sign: int
+    label: str
+    scale: float  # from the unit of the limit to the unit shown
+    unit: str
+
+
+SIDES = {  # by the field of Limit
+    "gain_low_db": Side("gain", 1, "gain, lower limit", 1.0, "dB"),
+    "gain_high_db": Side("gain", -1, "gain, upper limit", 1.0, "dB"),
+    "phase_low": Side("phase", 1, "phase, lower limit", 180 / math.pi, "deg"),
+    "phase_high": Side("phase", -1, "phase, upper limit", 180 / math.pi, "deg"),
+}
+
+
 @dataclass(frozen=True, kw_only=True)
 class Limit:
-    """Limits at one amplitude, straight between the given points over the logarithm of frequency.
+    """Limits at one amplitude, linear between the given points over the logarithm of frequency.
 
     Parameters
     ----------
     amplitude : float
-        Of the sine of the reference, over the stroke [-].
+        Of the reference sine, over the stroke [-].
     frequencies : tuple of float
         Ascending [Hz].
     gain_low_db, gain_high_db : tuple of float
@@ -66,9 +84,6 @@ class Limit:
         return np.interp(np.log(frequencies), np.log(self.frequencies), getattr(self, side))
 
 
-SIDES = {"gain_low_db": 1, "gain_high_db": -1, "phase_low": 1, "phase_high": -1}  # the sign of what is well
-
-
 @dataclass(frozen=True, kw_only=True)
 class Mask:
     """Limits at several amplitudes.
@@ -78,7 +93,7 @@ class Mask:
     title : str
         One line for reports.
     limits : tuple of Limit
-        All have to hold.
+        All have to be kept.
     """
 
     title: str
@@ -90,14 +105,16 @@ class Mask:
 
 
 class LimitCheck(NamedTuple):
-    """One side of a limit against what was measured."""
+    """One side of a limit compared with a measured response."""
 
     amplitude: float  # over the stroke
     side: str  # name of the field of Limit
-    slack: float  # smallest [dB] or [rad], negative where it is not kept; minus infinity where there is nothing to hold
+    slack: (
+        float  # smallest distance [dB] or [rad], negative where the limit is missed; minus infinity without a response
+    )
     frequency: float  # where that is [Hz]
-    points: int  # that were measured within the frequencies of the limit
-    failed: int  # of them, whose simulation did
+    points: int  # measured within the frequencies of the limit
+    failed: int  # of them, with a failed simulation
 
     @property
     def met(self) -> bool:
@@ -106,14 +123,14 @@ class LimitCheck(NamedTuple):
 
     @property
     def nothing(self) -> str:
-        """Why there is nothing to hold against the limit; empty where there is something."""
+        """Why there is no response to compare with the limit; empty where there is one."""
         if math.isfinite(self.slack):
             return ""
         return f"{self.failed} of {self.points} simulations failed" if self.failed else "nothing moves"
 
 
 def load_mask(path: Path | None = None) -> Mask:
-    """A mask from a file, or the built-in one.
+    """Read a mask from a file, or the built-in one.
 
     Raises
     ------
@@ -124,34 +141,34 @@ def load_mask(path: Path | None = None) -> Mask:
     return structure(read(built_in if path is None else path.resolve()), (), Mask)
 
 
-def checked(limit: Limit, frequencies: np.ndarray, response: np.ndarray, moves: np.ndarray) -> list[LimitCheck]:
-    """Every side of a limit against a response at its amplitude.
+def check_limit(limit: Limit, frequencies: np.ndarray, response: np.ndarray, moves: np.ndarray) -> list[LimitCheck]:
+    """Compare every side of a limit with a response at its amplitude.
 
     Parameters
     ----------
     limit : Limit
-        What has to hold.
+        The limit.
     frequencies : ndarray, (n,)
         Ascending [Hz].
     response : ndarray of complex, (n,)
         Load angle over reference.
     moves : ndarray of bool, (n,)
-        Where there is a response at all, or a simulation that failed; that has none in `response`.
+        Where the load moves, or the simulation failed; then `response` is not finite.
     """
     inside = (frequencies >= limit.frequencies[0]) & (frequencies <= limit.frequencies[-1])
     phase = phase_of(response, moves)
     gain = np.full(len(response), -np.inf)
     gain[moves] = to_db(abs(response[moves]))
     found = []
-    for side, sign in SIDES.items():
-        if not getattr(limit, side):
+    for name, side in SIDES.items():
+        if not getattr(limit, name):
             continue
-        seen = gain if side.startswith("gain") else phase
-        slack = sign * (seen[inside] - limit.at(side, frequencies[inside]))
-        # what does not move has no phase, and a simulation that failed has nothing: neither keeps to a limit
+        seen = gain if side.quantity == "gain" else phase
+        slack = side.sign * (seen[inside] - limit.at(name, frequencies[inside]))
+        # a load that does not move has no phase, a failed simulation no response: both miss the limit
         slack = np.where(np.isnan(slack), -np.inf, slack)
         worst = int(slack.argmin())
         at = float(frequencies[inside][worst])
         failed = int((~np.isfinite(response[inside])).sum())
-        found.append(LimitCheck(limit.amplitude, side, float(slack[worst]), at, int(inside.sum()), failed))
+        found.append(LimitCheck(limit.amplitude, name, float(slack[worst]), at, int(inside.sum()), failed))
     return found

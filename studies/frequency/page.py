@@ -1,4 +1,4 @@
-"""The page of a frequency-response study: what its template shows, in words and round numbers."""
+"""The page of a frequency-response study: what its template shows, in sentences and rounded numbers."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -9,40 +9,34 @@ import numpy as np
 from actuator import FrequencyResponse, LiftedMargins, Margins, Poles, Sensors, Spectrum
 from actuator.linear.bode import to_db
 from actuator.linear.margins.sensitivity import Peak, Sensitivities
-from gear import Backlash
-from studies.findings import rendered
+from actuator.system.hybrid import EventKind
+from actuator.system.hybrid import Place as ContactPlace
+from studies.findings import render
 from studies.frequency.bench import TESTS
-from studies.frequency.corners import Place
-from studies.frequency.mask import LimitCheck
-from studies.frequency.plan import PARTS, Plan
-from studies.frequency.study import Study
+from studies.frequency.mask import SIDES, LimitCheck
+from studies.frequency.plan import PARTS, Place, Plan
+from studies.frequency.study import CaseResponse
 
-SIDES = {
-    "gain_low_db": ("gain, from below", 1.0, "dB"),
-    "gain_high_db": ("gain, from above", 1.0, "dB"),
-    "phase_low": ("phase, from below", 180 / math.pi, "deg"),
-    "phase_high": ("phase, from above", 180 / math.pi, "deg"),
-}
-LEAST = 1e-12  # rad/(N m) of a load that yields at all
-IN_WORDS = {"rad": (180 / math.pi, "deg"), "rad/s": (180 / math.pi, "deg/s")}
+LEAST_COMPLIANCE = 1e-12  # rad/(N m), below is zero
+SHOWN_UNITS = {"rad": (180 / math.pi, "deg"), "rad/s": (180 / math.pi, "deg/s")}
 
 
 def html(  # noqa: PLR0913, PLR0917 - all there is to show
     plan: Plan,
-    studies: Sequence[Study],
+    studies: Sequence[CaseResponse],
     measured: Sequence[Spectrum],
     result: dict[str, Any],
     text: list[str],
     pictures: tuple[Mapping[str, str], Mapping[str, str]],
 ) -> str:
-    """The page; `pictures` are all of them in base64 by name, and what the names begin with by case."""
+    """Render the page; `pictures` are all pictures in base64 by name, and the prefixes of their names by case."""
     found, prefixes = pictures
     shown = []
     for study in studies:
         prefix = prefixes[study.case.name]
         own = {name.removeprefix(prefix): image for name, image in found.items() if name.startswith(prefix)}
         shown.append(_shown(plan, study, own, measured))
-    return rendered(
+    return render(
         "frequency_response.html",
         shown=shown,
         beside=found.get("beside", ""),
@@ -56,13 +50,15 @@ def html(  # noqa: PLR0913, PLR0917 - all there is to show
         ),
         tests=[_test(studies, name) for name in TESTS],
         parameters=_parameters(studies),
-        assumed=_assumed(plan, studies),
+        assumed=list_assumptions(plan, studies),
         result=result,
         text=text,
     )
 
 
-def _shown(plan: Plan, study: Study, pictures: Mapping[str, str], measured: Sequence[Spectrum]) -> dict[str, Any]:
+def _shown(
+    plan: Plan, study: CaseResponse, pictures: Mapping[str, str], measured: Sequence[Spectrum]
+) -> dict[str, Any]:
     linear = study.linear
     return {
         "name": study.case.name,
@@ -71,11 +67,11 @@ def _shown(plan: Plan, study: Study, pictures: Mapping[str, str], measured: Sequ
         "met": study.met,
         "kept": sum(check.met for checks in study.checks.values() for check in checks),
         "rows": [
-            {"place": study.words(place)} | _check(plan, check)
+            {"place": study.label(place)} | _check(plan, check)
             for place, checks in study.checks.items()
             for check in checks
         ],
-        "where": f"{first.capitalize()}. " if (first := study.words(next(iter(study.checks)))) else "",
+        "where": f"{first.capitalize()}. " if (first := study.label(next(iter(study.checks)))) else "",
         "point": ", ".join(f"{name} {value:.4g}" for name, value in {"reference": 0.0, **study.inputs}.items()),
         "corners": _corners(study),
         "pictures": pictures,
@@ -94,27 +90,32 @@ def _shown(plan: Plan, study: Study, pictures: Mapping[str, str], measured: Sequ
         "missing": study.missing,
         "margins": {at: margins_of(linear.margins[at], linear.sensitivities[at]) for at in linear.margins},
         "yields": [
-            [mode, at_peak(each), number(1 / each.value)] for mode, each in linear.yields.items() if each.value > LEAST
+            [mode, format_peak(each), number(1 / each.value)]
+            for mode, each in linear.compliance_peaks.items()
+            if each.value > LEAST_COMPLIANCE
         ],
         "poles": {mode: poles_of(found) for mode, found in linear.poles.items()},
     }
 
 
-def _notes(study: Study, family: FrequencyResponse, given: str, shown: Callable[[float], str]) -> list[list[str]]:
-    """A row for all sines of one amplitude at one place of which there is the same to say."""
+def _notes(
+    study: CaseResponse, family: FrequencyResponse, given: str, shown: Callable[[float], str]
+) -> list[list[str]]:
+    """A row for all sines of one amplitude at one place with the same note."""
     note = family.data.note
     rows: dict[tuple[str, ...], list[float]] = {}
     for index in map(tuple, np.argwhere(note.values != "")):
         one = note[index]
         corner = str(one["set"].item())
-        place = study.words(Place(corner, float(one["load"]))) if corner else study.words(next(iter(study.checks)))
-        matter = str(one.item()).partition(":" if "not settled" in one.item() else ";")[0]
+        place = study.label(Place(corner, float(one["load"]))) if corner else study.label(next(iter(study.checks)))
+        failed = not np.isfinite(family.data.response.isel(output=0)[index].item())
+        matter = str(one.item()).partition(";" if failed else ":")[0]
         rows.setdefault((given, place, shown(float(one["amplitude"])), matter), []).append(float(one["frequency"]))
     return [[*key[:3], ", ".join(f"{value:.3g}" for value in sorted(hertz)), key[3]] for key, hertz in rows.items()]
 
 
-def _corners(study: Study) -> dict[str, Any]:
-    """What the corners change: a row per parameter, a column per corner."""
+def _corners(study: CaseResponse) -> dict[str, Any]:
+    """The parameters that the corners change: a row per parameter, a column per corner."""
     changed = {name: None for changes in study.sets.values() for name in changes}
     known = study.parameters
     return {
@@ -127,11 +128,11 @@ def _corners(study: Study) -> dict[str, Any]:
 
 
 def _check(plan: Plan, check: LimitCheck) -> dict[str, Any]:
-    what, scale, unit = SIDES[check.side]
+    side = SIDES[check.side]
     return {
         "amplitude": _amplitude(plan, check.amplitude),
-        "limit": what,
-        "slack": check.nothing or f"{scale * check.slack:+.2f} {unit}",
+        "limit": side.label,
+        "slack": check.nothing or f"{side.scale * check.slack:+.2f} {side.unit}",
         "at": f"{check.frequency:.3g} Hz",
         "points": check.points,
         "met": check.met,
@@ -145,18 +146,18 @@ def _amplitude(plan: Plan, part: float) -> str:
 def _limit(plan: Plan, k: int) -> list[str]:
     limit = plan.mask.limits[k]
     cells = [_amplitude(plan, limit.amplitude), ", ".join(f"{value:g}" for value in limit.frequencies)]
-    for side, (_, scale, _) in SIDES.items():
-        cells.append(", ".join(f"{scale * value:.4g}" for value in getattr(limit, side)) or "–")
+    for name, side in SIDES.items():
+        cells.append(", ".join(f"{side.scale * value:.4g}" for value in getattr(limit, name)) or "–")
     return cells
 
 
-def _test(studies: Sequence[Study], name: str) -> dict[str, Any]:
+def _test(studies: Sequence[CaseResponse], name: str) -> dict[str, Any]:
     """The numbers of one test, a column per case."""
     tables = [study.tests[name]["numbers"] for study in studies]
     units = {key: unit for table in tables for key, (_, unit) in table.items()}
     rows = []
     for key, unit in units.items():
-        scale, word = IN_WORDS.get(unit, (1.0, unit))
+        scale, word = SHOWN_UNITS.get(unit, (1.0, unit))
         values = [
             number(scale * table[key][0], "never" if unit == "s" else "none") if key in table else ""
             for table in tables
@@ -170,7 +171,7 @@ def _test(studies: Sequence[Study], name: str) -> dict[str, Any]:
     }
 
 
-def _parameters(studies: Sequence[Study]) -> list[dict[str, Any]]:
+def _parameters(studies: Sequence[CaseResponse]) -> list[dict[str, Any]]:
     tables = [study.parameters for study in studies]
     units = {name: unit for table in tables for name, (_, unit) in table.items()}
     rows = []
@@ -187,10 +188,10 @@ def _parameters(studies: Sequence[Study]) -> list[dict[str, Any]]:
     return rows
 
 
-def _assumed(plan: Plan, studies: Sequence[Study]) -> list[str]:
-    """Only of what there is; of what not every case has, with the names of those that do."""
+def list_assumptions(plan: Plan, studies: Sequence[CaseResponse]) -> list[str]:
+    """The assumptions that apply, with the names of the cases where they do not apply to all."""
 
-    def where(has: Callable[[Study], Any]) -> str | None:
+    def where(has: Callable[[CaseResponse], Any]) -> str | None:
         names = [study.case.name for study in studies if has(study)]
         if len(names) == len(studies):
             return ""
@@ -198,29 +199,31 @@ def _assumed(plan: Plan, studies: Sequence[Study]) -> list[str]:
 
     sentences = [
         (
-            "Contacts of teeth after F. L. J. van der Linden, with friction averaged over the path of contact",
+            "Tooth contacts after F. L. J. van der Linden, with friction averaged over the path of contact",
             where(lambda study: any(mesh.friction for mesh in study.case.actuator.gear.meshes.values())),
         ),
         (
-            "Teeth with backlash push and never pull",
+            "Teeth with backlash push but do not pull",
             where(
-                lambda study: any(isinstance(m.elasticity, Backlash) for m in study.case.actuator.gear.meshes.values())
+                lambda study: any(
+                    event.kind is EventKind.GAP and event.place is ContactPlace.MESH
+                    for event in study.case.actuator.system().events
+                )
             ),
         ),
         (
-            "Contacts truly stick, and slide off at their breakaway",
-            where(lambda study: any(mode.endswith(".motion") for mode in study.case.actuator.system().modes)),
+            "Contacts stick with zero slip speed, and break away at their breakaway friction",
+            where(lambda study: study.case.actuator.system().contacts),
         ),
         ("Averaged inverter", where(lambda study: study.case.actuator.inverter is not None)),
         (
-            "Decoupling with the motor parameters given",
+            "Decoupling with the true motor parameters",
             where(lambda study: _is_decoupled(study.case.actuator)),
         ),
         ("Controllers in continuous time", where(lambda study: study.case.actuator.sampling is None)),
         ("Controllers sampled", where(lambda study: study.case.actuator.sampling is not None)),
         (
-            "Linear models take sensors to read between their counts, without noise; the simulations take them as they "
-            "are",
+            "Linear models neglect quantization and noise of the sensors; the simulations include them",
             where(lambda study: study.case.actuator.sensors != Sensors()),
         ),
         ("Unpowered: no torque from the motor", where(lambda study: "unpowered" in study.stiffness)),
@@ -231,19 +234,19 @@ def _assumed(plan: Plan, studies: Sequence[Study]) -> list[str]:
             ),
         ),
         (
-            "Temperatures act on laws that have an oil, and otherwise as the corners say, parameter by parameter",
+            "Temperatures act on laws with an oil; other parameters change only as the corners state",
             where(lambda study: len(study.sets) > 1),
         ),
         (
-            "Corners and bias loads are those of the sines of the reference; all else is of the actuator as it is: "
-            "linear models, loops, margins, stiffness and bench tests (but the one that is named after the corners)",
+            "Corners and bias loads apply to the reference sines; linear models, loops, margins, stiffness and bench "
+            "tests (except the one in every corner) are those of the actuator as it is",
             where(lambda study: len(study.checks) > 1),
         ),
     ]
     return [
-        f"Stroke of {math.degrees(plan.stroke):.4g} deg from end to end; amplitudes are peak values, in parts of it.",
-        "A sine is settled where two measurements in a row agree within 0.05 % of the fundamental; it starts at "
-        "rest, at its crest. Phase and gain are those of the fundamental.",
+        f"Stroke of {math.degrees(plan.stroke):.4g} deg from end to end; amplitudes are peak values, relative to it.",
+        "A sine starts at rest, at its crest, and is settled when two successive measurements agree within 0.05 % of "
+        "the fundamental. Gain and phase are those of the fundamental.",
         "Torques on the load: "
         + "; ".join(
             f"{', '.join(f'{part * study.torque:.3g}' for part in PARTS)} N m ({study.case.name}, of "
@@ -251,34 +254,34 @@ def _assumed(plan: Plan, studies: Sequence[Study]) -> list[str]:
             for study in studies
         )
         + ".",
-        "Mask limits are held at measured points only.",
+        "Mask limits are checked at measured points only.",
         *(f"{sentence}{names}." for sentence, names in sentences if names is not None),
     ]
 
 
-ROUNDING = 1e-12  # a number in a table that is none
-LEAST_SHARE = 0.02  # of a state in a pole that is worth a word
+ZERO = 1e-12  # a smaller number in a table is zero
+LEAST_SHARE = 0.02  # participation of a state that is listed
 MOST_STATES = 4
 
 
 def margins_of(
     by_mode: Mapping[str, Margins | LiftedMargins], curves: Mapping[str, Sensitivities | None]
 ) -> list[dict[str, Any]]:
-    """A row per mode; one for all through which nothing passes."""
+    """A row per mode; one row for all modes with zero loop gain."""
     cut = [mode for mode in by_mode if curves[mode] is None]
     rows = [_margin(by_mode[mode], mode, each) for mode, each in curves.items() if each is not None]
-    nothing = {"mode": "; ".join(cut), "closed": "nothing passes", "cells": ["–"] * 6, "gains": "–", "phases": "–"}
+    nothing = {"mode": "; ".join(cut), "closed": "loop gain is zero", "cells": ["–"] * 6, "gains": "–", "phases": "–"}
     return rows + ([nothing] if cut else [])
 
 
-def at_peak(peak: Peak) -> str:
-    """The value and where it is; without a peak the value alone."""
+def format_peak(peak: Peak) -> str:
+    """The value with its frequency; without a peak the value alone."""
     where = "" if math.isnan(peak.frequency) else f" at {peak.frequency / (2 * math.pi):.3g} Hz"
     return f"{peak.value:.3g}{where}"
 
 
 def _margin(found: Margins | LiftedMargins, mode: str, curves: Sensitivities) -> dict[str, Any]:
-    peaks = [at_peak(curves.sensitivity_peak), at_peak(curves.complementary_peak)]
+    peaks = [format_peak(curves.sensitivity_peak), format_peak(curves.complementary_peak)]
     closed = "stable" if found.stable else "unstable"
     if isinstance(found, LiftedMargins):
         low, high = (to_db(value) for value in (found.lower_gain, found.upper_gain))
@@ -288,7 +291,7 @@ def _margin(found: Margins | LiftedMargins, mode: str, curves: Sensitivities) ->
             "mode": mode,
             "closed": closed,
             "cells": cells,
-            "gains": "of all values in a period at once",
+            "gains": "of all values in a period together",
             "phases": "",
         }
     cells = [
@@ -307,7 +310,7 @@ def _margin(found: Margins | LiftedMargins, mode: str, curves: Sensitivities) ->
 
 
 def poles_of(found: Poles) -> list[dict[str, str]]:
-    """A row per pole, with the states that take part in it."""
+    """A row per pole, with the states that participate in it."""
     rows = []
     for pole in found:
         ranked = sorted(pole.participation.items(), key=lambda pair: -pair[1])[:MOST_STATES]
@@ -326,12 +329,12 @@ def poles_of(found: Poles) -> list[dict[str, str]]:
 
 
 def number(value: float, infinite: str = "–") -> str:
-    """A number for a table; a word where it is infinite, a dash where there is none."""
+    """A number for a table; a dash for nan, `infinite` where it is not finite."""
     if math.isnan(value):
         return "–"
     if not math.isfinite(value):
         return infinite
-    return f"{value:.4g}" if abs(value) > ROUNDING else "0"
+    return f"{value:.4g}" if abs(value) > ZERO else "0"
 
 
 def _is_decoupled(actuator: Any) -> bool:

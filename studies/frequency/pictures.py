@@ -27,9 +27,9 @@ from actuator.plots.bode import (
 from actuator.plots.response import FAILED, READING, STILL, draw_responses
 from actuator.plots.style import legend_below, shown_as
 from actuator.system.contact_modes import FREE
-from studies.frequency.corners import Place
 from studies.frequency.mask import Mask
-from studies.frequency.study import Study
+from studies.frequency.plan import Place
+from studies.frequency.study import CaseResponse
 
 ANGLE = shown_as("rad")
 LIMIT_COLOR = PEAK_COLOR = "#c0392b"
@@ -39,7 +39,7 @@ LEFT = 10.0  # Hz, up to which the words about a peak stand to its right
 MOST_AMPLITUDES = len(STYLES)  # in a comparison
 
 
-def plot_family(study: Study, mask: Mask, stroke: float, measured: Sequence[Spectrum] = ()) -> Figure:
+def plot_family(study: CaseResponse, mask: Mask, stroke: float, measured: Sequence[Spectrum] = ()) -> Figure:
     """The amplitude family in front of the linear envelope, with the limits and what was measured on hardware."""
     figure = study.family.plot(study.linear.closed, measured)
     gain, phase = figure.axes
@@ -50,7 +50,7 @@ def plot_family(study: Study, mask: Mask, stroke: float, measured: Sequence[Spec
     return figure
 
 
-def plot_places(study: Study, places: Sequence[Place], mask: Mask, stroke: float) -> Figure:
+def plot_places(study: CaseResponse, places: Sequence[Place], mask: Mask, stroke: float) -> Figure:
     """The amplitude family at each place, side by side, in front of its linear envelope, with the limits."""
     figure = Figure(figsize=(1.5 + 3.6 * max(len(places), 2), 7), layout="constrained")
     panels = bode_panels(figure, len(places))
@@ -59,7 +59,7 @@ def plot_places(study: Study, places: Sequence[Place], mask: Mask, stroke: float
         where = {"set": place.corner, "load": place.bias}
         draw_responses(gain, phase, study.family, study.closed.get(place), **where)
         _draw_limits(gain, phase, mask, stroke)
-        gain.set_title(study.words(place), fontsize="medium")
+        gain.set_title(study.label(place), fontsize="medium")
         ends.append(gain.get_ylim())
     panels[0, 0].set_ylim(max(min(low for low, _ in ends), LEAST_DB), max(high for _, high in ends))
     for axes in panels.flat:
@@ -98,12 +98,12 @@ def _legend(figure: Figure, panels: Iterable[Axes]) -> None:
     )
 
 
-def plot_beside(studies: Sequence[Study], amplitudes: Sequence[float]) -> Figure:
+def plot_beside(studies: Sequence[CaseResponse], amplitudes: Sequence[float]) -> Figure:
     """The same sines through every actuator: a color each, a line style per amplitude [rad]."""
     figure = Figure(figsize=(9, 7), layout="constrained")
     gain, phase = bode_panels(figure)[:, 0]
     for k, study in enumerate(studies):
-        place = study.words(next(iter(study.checks)))
+        place = study.label(next(iter(study.checks)))
         name = ", ".join(part for part in (study.case.name, place) if part)
         hertz = study.family.data.frequency.values
         for amplitude, style in zip(amplitudes[:MOST_AMPLITUDES], STYLES, strict=False):

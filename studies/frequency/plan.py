@@ -1,43 +1,123 @@
-"""What a frequency-response study measures, the same for every actuator that is laid beside another."""
+"""What a frequency-response study measures: sines, corners and bias loads, and on which actuators."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import NamedTuple
 
-from actuator import Actuator
+from actuator import Actuator, temperature_sets
 from actuator.system.parameters import with_values
 from studies.cases import Case, built_in, load_case
-from studies.files import CaseError
+from studies.corners import AS_IS, CornerSettings, find_corner, read_corners
+from studies.files import StudyError, built_in_files, locate, read
 from studies.frequency.bench import TESTS
-from studies.frequency.corners import Corners, Place, WrongRequest
 from studies.frequency.mask import Mask
+from studies.specification import Specification, built_in_specifications, load_specification
 from studies.tuning.plant import dead_banded
-from studies.tuning.tuned_gains import tuned_gains
+from studies.tuning.result import read_tuned_gains
 
 PARTS = (0.1, 0.2, 0.4)  # of the largest torque, in the sines of torque on the load
-EVERY = 2  # so many frequencies of the reference to one of the torque
+EVERY = 2  # frequencies of the reference per frequency of the torque
+AXIS = "temperature"  # of the corners of a specification
+TEMPERATURES = (218.15, 293.15, 343.15)  # K, of oils
+TUNING = ".json"  # suffix of the result of a tuning
+
+
+class Place(NamedTuple):
+    """A corner by its name, with a bias load [N m]."""
+
+    corner: str
+    bias: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Corners:
+    """Sets of parameters by name, for any actuator that has the parameters.
+
+    Parameters
+    ----------
+    given : tuple of CornerSettings or None
+        Those asked for; None for temperatures: of the specification, else of oils.
+    specification : Specification or None
+        Its axis `temperature`, where it has one.
+    """
+
+    given: tuple[CornerSettings, ...] | None = None
+    specification: Specification | None = field(default=None, repr=False)
+
+    def sets_of(self, actuator: Actuator) -> dict[str, dict[str, float]]:
+        """Parameters by name of the corner; the first is the actuator as it is.
+
+        Raises
+        ------
+        StudyError
+            Where it has no such parameter, or the value breaks a rule.
+        """
+        defaults = {parameter.name: float(parameter.default) for parameter in actuator.system().parameters}
+        try:
+            found = self._sets(actuator)
+        except StudyError as error:
+            raise StudyError(f"corner {error}; choose others with --corner") from None
+        same = [name for name, changes in found.items() if all(defaults[k] == value for k, value in changes.items())]
+        first = same[0] if same else AS_IS
+        return {first: {}} | {name: changes for name, changes in found.items() if name not in same}
+
+    def _sets(self, actuator: Actuator) -> dict[str, dict[str, float]]:
+        if self.given is not None:
+            return dict(find_corner(actuator.system(), corner) for corner in self.given)
+        if self.specification is not None and AXIS in self.specification.corners:
+            only = replace(self.specification, corners={AXIS: self.specification.corners[AXIS]})
+            return dict(only.all_corners(actuator))
+        try:
+            return temperature_sets(actuator, TEMPERATURES)
+        except ValueError:  # no part depends on a temperature
+            return {}
+
+
+def choose_corners(case: str | Path, texts: Sequence[str]) -> Corners:
+    """Corners from texts as of `read_corners`, or without any, temperatures for a case.
+
+    Those are the temperatures of the built-in specification of the case, or of the nearest case that it is based on,
+    else of its oils.
+
+    Raises
+    ------
+    StudyError
+        For a text that is not a corner, or a case that cannot be read.
+    """
+    return Corners(given=read_corners(texts)) if texts else Corners(specification=_find_specification(case))
+
+
+def _find_specification(case: str | Path) -> Specification | None:
+    files = built_in_files()
+    for source in read(locate(case, Path())).sources:
+        for name in built_in_specifications():
+            if files.get(name) == source.file:
+                return load_specification(name)[0]
+    return None
 
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """What is measured.
+    """What is measured, the same for every actuator of a comparison.
 
     Parameters
     ----------
     mask : Mask
-        What the response has to keep to; its amplitudes are measured too.
+        Limits of the response; its amplitudes are measured too.
     stroke : float
-        From end to end [rad].
+        Travel of the load from end to end [rad].
     amplitudes : tuple of float
-        Of the sines of the reference, over the stroke [-].
+        Amplitudes of the reference sines, over the stroke [-].
     frequencies : tuple of float
         [Hz].
     torque : float or None
-        Largest on the load in stiffness and bench tests [N m]; None for what the motor has at most, at the load.
+        Largest torque on the load in stiffness and bench tests [N m]; None for the motor's largest, at the load.
     corners : Corners
-        Sets of parameters with which the sines of the reference run, besides the actuator as it is.
+        Sets of parameters for the reference sines, besides the actuator as it is.
     biases : tuple of float
-        Bias loads with which they run, besides none [N m].
+        Bias loads for the reference sines, besides none [N m].
     """
 
     mask: Mask
@@ -51,34 +131,34 @@ class Plan:
     def __post_init__(self) -> None:
         wrong = [f"{100 * value:g} %" for value in self.amplitudes if not 0 < value <= 0.5]  # noqa: PLR2004 - half
         if not self.amplitudes or wrong:
-            raise WrongRequest(
-                f"amplitudes are > 0 and at most 50 % of the stroke, and at least one, got {', '.join(wrong) or 'none'}"
+            raise StudyError(
+                f"amplitudes must be > 0 and <= 50 % of the stroke, at least one, got {', '.join(wrong) or 'none'}"
             )
         if not self.frequencies or min(self.frequencies) <= 0:
-            raise WrongRequest(f"frequencies are > 0 Hz, and at least one, got {list(self.frequencies)}")
+            raise StudyError(f"at least one frequency is needed, each > 0 Hz, got {list(self.frequencies)}")
         if not all(map(math.isfinite, self.biases)):
-            raise WrongRequest(f"bias loads are numbers in N m, got {', '.join(map(str, self.biases))}")
+            raise StudyError(f"bias loads are numbers in N m, got {', '.join(map(str, self.biases))}")
         for k, limit in enumerate(self.mask.limits):
             low, high = limit.frequencies[0], limit.frequencies[-1]
             if not any(low <= frequency <= high for frequency in self.frequencies):
-                raise WrongRequest(
-                    f"no frequency is within limit {k + 1} of the mask, {low:g} to {high:g} Hz; choose others with "
-                    "--frequencies, or another mask"
+                raise StudyError(
+                    f"no frequency is within limit {k + 1} of the mask, {low:g} to {high:g} Hz; choose other "
+                    "--frequencies or another mask"
                 )
 
     @property
     def all_amplitudes(self) -> tuple[float, ...]:
-        """Those asked for and those of the mask, ascending."""
+        """The amplitudes and those of the mask, ascending."""
         return tuple(sorted({*self.amplitudes, *(limit.amplitude for limit in self.mask.limits)}))
 
     @property
     def all_biases(self) -> tuple[float, ...]:
-        """None first, then those asked for [N m]."""
+        """Zero first, then the bias loads [N m]."""
         return tuple(dict.fromkeys((0.0, *self.biases)))
 
     @property
     def torque_frequencies(self) -> tuple[float, ...]:
-        """Of the torque on the load [Hz]."""
+        """Frequencies of the torque on the load [Hz]."""
         return tuple(sorted(self.frequencies)[::EVERY])
 
     @property
@@ -92,59 +172,56 @@ class Plan:
         return [Place(corner, bias) for bias in self.all_biases for corner in self.corners.sets_of(actuator)]
 
     def sines(self, actuator: Actuator) -> int:
-        """Sines of the reference."""
+        """Number of reference sines for one actuator."""
         return len(self.places(actuator)) * len(self.all_amplitudes) * len(self.frequencies)
 
     def points(self, actuator: Actuator) -> int:
-        """That are computed for one actuator."""
+        """Number of points computed for one actuator."""
         return self.sines(actuator) + 2 * len(PARTS) * len(self.torque_frequencies) + len(TESTS)
 
 
-TUNING = ".json"  # ending of the result of a tuning
-
-
 def load_positioner(case: str | Path) -> Case:
-    """A case with a position controller.
+    """Load a case with a position controller.
 
     Raises
     ------
-    CaseError, WrongRequest
-        For a file that cannot be read; for a case without one.
+    StudyError
+        For a file that cannot be read, or a case without one.
     """
     loaded = load_case(case)
     if "reference" not in [quantity.name for quantity in loaded.actuator.system().inputs]:
-        raise WrongRequest(
-            f"{loaded.name}: has no position controller, so no response to a reference; choose another case"
+        raise StudyError(
+            f"{loaded.name} has no position controller, hence no response to a reference; choose another case"
         )
     return loaded
 
 
-def source_of(name: str) -> str | Path:
-    """A case as `load_case` takes it."""
+def locate_case(name: str) -> str | Path:
+    """The name of a built-in case, or a path, for `load_case`."""
     return name if name in built_in() else Path(name)
 
 
-def second(name: str, first: Case) -> Case:
-    """A case by name or path, or the first with the gains in the result.json of a tuning.
+def load_second(name: str, first: Case) -> Case:
+    """Load a case by name or path, or the first case with the gains in the result.json of a tuning.
 
     Raises
     ------
-    CaseError, WrongRequest
-        For a file that cannot be read or is neither; for a case that has no such gains, or is the first again.
+    StudyError
+        For a file that cannot be read or is neither; for a case that lacks such gains, or is the first again.
     """
     if not name.endswith(TUNING):
-        other = load_positioner(source_of(name))
+        other = load_positioner(locate_case(name))
         if other.name == first.name:
-            raise WrongRequest(f"both cases are called {first.name}; a case is not laid beside itself")
+            raise StudyError(f"both cases are called {first.name}; choose another case for --against")
         return other
     label = f"{first.name}-tuned"
     try:
         plant = dead_banded(first.actuator)
-        gains = tuned_gains(Path(name), plant)
+        gains = read_tuned_gains(Path(name), plant)
         controller = with_values(plant.controller, "controller", gains.values)
-    except CaseError:
+    except StudyError:
         raise
-    except ValueError as error:  # an actuator that is not one to be tuned, or a gain that breaks a rule
-        raise WrongRequest(f"{name}: {error}") from None
+    except ValueError as error:  # a gain that breaks a rule
+        raise StudyError(f"{name}: {error}") from None
     actuator = replace(first.actuator, controller=controller, name=label)
-    return replace(first, name=label, title=f"{first.title}, {gains.words}", actuator=actuator)
+    return replace(first, name=label, title=f"{first.title}, {gains.label}", actuator=actuator)

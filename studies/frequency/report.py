@@ -12,13 +12,13 @@ import numpy as np
 from actuator import LiftedMargins, Margins, Spectrum
 from actuator.linear.margins.sensitivity import Sensitivities
 from actuator.plots.bode import plot_modes
-from studies.cache import program
+from studies.cache import program_fingerprint
 from studies.findings import Findings, versions
-from studies.frequency.mask import LimitCheck
-from studies.frequency.page import SIDES, html
+from studies.frequency.mask import SIDES, LimitCheck
+from studies.frequency.page import html
 from studies.frequency.pictures import plot_beside, plot_compliance, plot_family, plot_places, plot_sensitivities
 from studies.frequency.plan import PARTS, Plan
-from studies.frequency.study import Study
+from studies.frequency.study import CaseResponse
 from studies.frequency.tables import margin_rows, response_rows, stiffness_rows, write_netcdf, write_rows
 
 if TYPE_CHECKING:
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 ABREAST = 3  # places in a picture
 
 
-def study_findings(plan: Plan, studies: Sequence[Study], measured: Sequence[Spectrum] = ()) -> Findings:
-    """Pictures, numbers, sentences and tables of one study, or of several side by side."""
+def study_findings(plan: Plan, studies: Sequence[CaseResponse], measured: Sequence[Spectrum] = ()) -> Findings:
+    """Pictures, numbers, sentences and tables of one actuator, or of several side by side."""
     several = len(studies) > 1
 
     def named(label: str, name: str) -> str:
@@ -64,7 +64,7 @@ def study_findings(plan: Plan, studies: Sequence[Study], measured: Sequence[Spec
 
 
 def file_name(name: str) -> str:
-    """Of the picture of a bench test."""
+    """File name of the picture of a bench test."""
     return "test_" + name.replace(" ", "_")
 
 
@@ -73,7 +73,7 @@ def _compared(plan: Plan) -> list[float]:
     return sorted({limit.amplitude * plan.stroke for limit in plan.mask.limits})
 
 
-def _pictures(plan: Plan, study: Study, measured: Sequence[Spectrum]) -> "dict[str, Figure]":
+def _pictures(plan: Plan, study: CaseResponse, measured: Sequence[Spectrum]) -> "dict[str, Figure]":
     linear = study.linear
     places = list(study.checks)
     found = {"family": plot_family(study, plan.mask, plan.stroke, measured), "harmonics": study.family.plot_harmonics()}
@@ -81,7 +81,7 @@ def _pictures(plan: Plan, study: Study, measured: Sequence[Spectrum]) -> "dict[s
         for k in range(0, len(places), ABREAST):
             found[f"places_{k // ABREAST + 1}"] = plot_places(study, places[k : k + ABREAST], plan.mask, plan.stroke)
     found["closed"] = plot_modes(linear.closed, "load angle over reference, all loops closed")
-    found["compliance"] = plot_compliance(linear.compliance, linear.yields)
+    found["compliance"] = plot_compliance(linear.compliance, linear.compliance_peaks)
     for at, loops in linear.loops.items():
         words = at.replace("_", " ")
         if all(loop.ninputs == 1 for loop in loops.values()):
@@ -91,49 +91,49 @@ def _pictures(plan: Plan, study: Study, measured: Sequence[Spectrum]) -> "dict[s
     return found | {f"stiffness_{word}": stiffness.plot() for word, stiffness in study.stiffness.items()}
 
 
-def sentences(plan: Plan, studies: Sequence[Study]) -> list[str]:
-    """What came of it."""
+def sentences(plan: Plan, studies: Sequence[CaseResponse]) -> list[str]:
+    """The findings in sentences."""
     found = []
     for study in studies:
         name = study.case.name
         for place, checks in study.checks.items():
-            at = ", ".join(part for part in (name, study.words(place)) if part)
+            at = ", ".join(part for part in (name, study.label(place)) if part)
             missed = "; ".join(_missed(plan, check) for check in checks if not check.met)
             found.append(f"{at}: the mask is {f'missed: {missed}' if missed else 'kept'}.")
-        thresholds = study.tests["threshold"]["numbers"]
+        thresholds = study.tests["threshold"]["numbers"].values()
         if thresholds:
             each = ", ".join(
-                f"{math.degrees(value):.3g} deg at {key.removeprefix('threshold at ')}"
-                for key, (value, _) in thresholds.items()
+                f"{math.degrees(value):.3g} deg at {frequency:.3g} Hz"
+                for (value, _), frequency in zip(thresholds, plan.threshold_frequencies, strict=True)
             )
-            found.append(f"{name}: no contact slides below {each} (amplitude of the sine of the reference).")
+            found.append(f"{name}: no contact slides below a reference amplitude of {each}.")
         if study.tests["hold"]["words"]:
             found.append(f"{name}, held after a step of 2 %: {study.tests['hold']['words']}.")
         if study.family.notes:
             settled, failed = study.family.data.settled.values.astype(bool), _failed(study)
-            for count, words in ((~settled & ~failed).sum(), "have not settled"), (failed.sum(), "have failed"):
+            for count, words in ((~settled & ~failed).sum(), "did not settle"), (failed.sum(), "failed"):
                 if count:
                     found.append(f"{name}: {count} of {settled.size} sines {words}.")
     return found
 
 
-def _failed(study: Study) -> np.ndarray:
-    """Whose simulation did."""
+def _failed(study: CaseResponse) -> np.ndarray:
+    """Sines whose simulation failed."""
     return ~np.isfinite(study.family.data.response.isel(output=0).values)
 
 
 def _missed(plan: Plan, check: LimitCheck) -> str:
-    what, scale, unit = SIDES[check.side]
+    side = SIDES[check.side]
     at = f"{math.degrees(check.amplitude * plan.stroke):.3g} deg and {check.frequency:.3g} Hz"
-    by = check.nothing or f"by {-scale * check.slack:.2g} {unit}"
-    return f"{what}, at {at}, {by}"
+    by = check.nothing or f"by {-side.scale * check.slack:.2g} {side.unit}"
+    return f"{side.label}, at {at}, {by}"
 
 
 # -- numbers ----------------------------------------------------------------------------------------------
 
 
-def result_of(plan: Plan, studies: Sequence[Study]) -> dict[str, Any]:
-    """Everything that is a number, for machines; null where there is none."""
+def result_of(plan: Plan, studies: Sequence[CaseResponse]) -> dict[str, Any]:
+    """All numbers, for result.json; null where there is none."""
     return {
         "plan": {
             "stroke_rad": plan.stroke,
@@ -155,12 +155,12 @@ def result_of(plan: Plan, studies: Sequence[Study]) -> dict[str, Any]:
             ],
         },
         "cases": {study.case.name: _result(study) for study in studies},
-        "source": program(),
+        "source": program_fingerprint(),
         "versions": versions(),
     }
 
 
-def _result(study: Study) -> dict[str, Any]:
+def _result(study: CaseResponse) -> dict[str, Any]:
     linear = study.linear
     return {
         "title": study.case.title,
@@ -184,7 +184,8 @@ def _result(study: Study) -> dict[str, Any]:
             for at, modes in linear.sensitivities.items()
         },
         "largest_compliance": {
-            mode: {"rad_per_Nm": each.value, "frequency": each.frequency} for mode, each in linear.yields.items()
+            mode: {"rad_per_Nm": each.value, "frequency": each.frequency}
+            for mode, each in linear.compliance_peaks.items()
         },
         "poles": {
             mode: [
@@ -212,7 +213,7 @@ def _result(study: Study) -> dict[str, Any]:
 
 
 def _peaks(found: Sensitivities) -> dict[str, Any]:
-    """Largest S and T, and where [rad/s]."""
+    """Peaks of S and T, with their frequencies [rad/s]."""
     return {"S": found.sensitivity_peak._asdict(), "T": found.complementary_peak._asdict()}
 
 

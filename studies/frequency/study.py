@@ -1,12 +1,12 @@
-"""What is the frequency response of an actuator, and does it keep to its mask? One study, and what it is made of.
+"""The frequency response of one actuator, and whether it keeps to its mask.
 
-Linear models per contact mode with their loops, margins and poles; sines of several amplitudes through the hybrid
-simulation; dynamic stiffness, powered and not; bench tests. Finished points are kept in a file and not computed again.
+Linear models per contact mode with their loops, margins and poles; simulated sines of several amplitudes; dynamic
+stiffness, powered and unpowered; bench tests.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import control
 
@@ -22,29 +22,30 @@ from actuator import (
 )
 from actuator.simulation.many import run_many
 from actuator.simulation.signals import piece_at
-from studies.cache import Kept, actuator_of, fingerprint
+from studies.cache import fingerprint
 from studies.cases import Case
+from studies.files import StudyError
 from studies.frequency.bench import CORNERS, TESTS, BenchPlan, BenchWork
-from studies.frequency.corners import Place, WrongRequest
 from studies.frequency.linear import OUTPUT, LinearPart, closed_at, linear_part
-from studies.frequency.mask import LimitCheck, checked
-from studies.frequency.plan import PARTS, Plan
+from studies.frequency.mask import LimitCheck, check_limit
+from studies.frequency.plan import PARTS, Place, Plan
+from studies.study import Work
 
 
 @dataclass(frozen=True, kw_only=True)
-class Study:
-    """All that is found of one actuator.
+class CaseResponse:
+    """The frequency response of one actuator.
 
     Attributes
     ----------
     case : Case
         What is measured.
     model : str
-        A hash of all its parts and numbers.
+        A hash of its parts and parameters.
     inputs : mapping of str to float
         Constant inputs at the operating point.
     torque : float
-        Largest on the load [N m].
+        Largest torque on the load [N m].
     linear : LinearPart
         Models, loops, margins, poles of the actuator as it is.
     sets : mapping of str to mapping of str to float
@@ -52,11 +53,11 @@ class Study:
     closed : mapping of Place to mapping of str to StateSpace
         Linear responses of the load angle to the reference, by mode; the first place is the actuator as it is.
     family : FrequencyResponse
-        Of the load angle to the reference, in every corner with every bias load.
+        Load angle over reference, in every corner with every bias load.
     stiffness : mapping of str to DynamicStiffness
         "powered" and "unpowered".
     tests : mapping of str to mapping
-        By name: numbers with units, words, picture, and the reason where there is none.
+        Bench tests by name: numbers with units, text, picture, and the reason where there is none.
     checks : mapping of Place to tuple of LimitCheck
         Against the mask.
     missing : mapping of str to str
@@ -81,8 +82,8 @@ class Study:
         """Whether the response keeps to the mask at every place."""
         return all(check.met for checks in self.checks.values() for check in checks)
 
-    def words(self, place: Place) -> str:
-        """A place in words: what tells it from the others."""
+    def label(self, place: Place) -> str:
+        """A place in words, as far as needed to distinguish it from the others."""
         several = len(self.sets) > 1, len({other.bias for other in self.checks}) > 1
         parts = place.corner, f"bias {place.bias:+g} N m" if place.bias else "no bias"
         return ", ".join(part for part, shown in zip(parts, several, strict=True) if shown)
@@ -94,24 +95,24 @@ class Study:
 
 
 def largest_torque(case: Case) -> float:
-    """What the motor has at most at standstill, at the load [N m], without friction.
+    """Largest torque of the motor at standstill, at the load [N m], without friction.
 
     Raises
     ------
-    WrongRequest
+    StudyError
         For a motor without limits.
     """
     actuator, motor = case.actuator, case.actuator.motor
     if actuator.inverter is None or motor.driven_by != "voltage":
-        raise WrongRequest(f"{case.name}: its motor has no largest torque; give the one at the load with --torque")
+        raise StudyError(
+            f"{case.name}: its motor has no torque limit; give the largest torque at the load with --torque"
+        )
     plain: Any = motor.without_saturation()
     curve = torque_speed_curve(plain, actuator.inverter, [0.0])
     return abs(actuator.gear.ratio()) * float(curve.torques[0])
 
 
-def study(
-    case: Case, plan: Plan, kept: Kept, *, jobs: int, progress: Callable[[int], None] = lambda count: None
-) -> Study:
+def measure_case(case: Case, plan: Plan, work: Work) -> CaseResponse:
     """Measure an actuator, or finish what was begun.
 
     Parameters
@@ -120,17 +121,13 @@ def study(
         From `load_positioner`.
     plan : Plan
         What is measured.
-    kept : Kept
-        Finished points.
-    jobs : int
-        Processes.
-    progress : callable
-        Called with how many more of `plan.points` are done.
+    work : Work
+        Cache, processes and progress.
 
     Raises
     ------
-    WrongRequest
-        Where there is no operating point, or no torque to choose.
+    StudyError
+        Where there is no operating point, or no largest torque.
     """
     actuator, sets = case.actuator, plan.corners.sets_of(case.actuator)
     torque = largest_torque(case) if plan.torque is None else plan.torque
@@ -139,7 +136,7 @@ def study(
     try:
         linear = linear_part(actuator, inputs)
     except NoEquilibrium as error:
-        raise WrongRequest(f"{case.name}: no operating point: {error}") from None
+        raise StudyError(f"{case.name}: no operating point: {error}") from None
     first, *others = plan.places(actuator)
     closed = {first: linear.closed}
     for place in others:
@@ -147,15 +144,15 @@ def study(
             closed[place] = closed_at(actuator, inputs, sets, place)
         except NoEquilibrium as error:
             missing[f"linear models, {place.corner}, bias {place.bias:+g} N m"] = str(error)
-    work = _Work(actuator, inputs, kept, jobs, progress)
-    model = actuator_of(actuator)
+    simulated = _Simulations(actuator, inputs, work, plan.points(actuator))
+    model = fingerprint(actuator)
     bench = BenchPlan(
         stroke=plan.stroke, torque=torque, frequencies=plan.threshold_frequencies, sets=sets, inputs=inputs
     )
-    tests = work.tests(bench, model)
-    family = work.family(plan, sets)
-    stiffness = work.stiffness(plan, torque, missing)
-    return Study(
+    tests = simulated.tests(bench, model)
+    family = simulated.family(plan, sets)
+    stiffness = simulated.stiffness(plan, torque, missing)
+    return CaseResponse(
         case=case,
         model=model,
         inputs=inputs,
@@ -171,91 +168,65 @@ def study(
     )
 
 
-class _Work(NamedTuple):
-    """What is simulated, and how."""
+class _Simulations:
+    """The simulations of one actuator."""
 
-    actuator: Actuator
-    inputs: Mapping[str, float]
-    kept: Kept
-    jobs: int
-    progress: Callable[[int], None]
+    def __init__(self, actuator: Actuator, inputs: Mapping[str, float], work: Work, count: int) -> None:
+        self.actuator, self.inputs, self.work = actuator, inputs, work
+        self.finished, self.count = 0, count
+
+    def _options(self, count: int) -> dict[str, Any]:
+        """Of `run_many`, for the next points."""
+        begin, self.finished = self.finished, self.finished + count
+        progress = self.work.part(begin / self.count, self.finished / self.count)
+        return {"done": self.work.cache, "workers": self.work.jobs, "progress": progress}
 
     def tests(self, bench: BenchPlan, model: str) -> dict[str, Mapping[str, Any]]:
-        """Of the bench, by name; only one of them depends on the corners."""
+        """Bench tests by name; only one of them depends on the corners."""
         plans = {name: bench if name == CORNERS else replace(bench, sets={}) for name in TESTS}
-        with _Steps(self.progress, len(TESTS)) as steps:
-            found = run_many(
-                BenchWork(self.actuator, bench),
-                {f"{name}, {fingerprint([model, asdict(each)])}": name for name, each in plans.items()},
-                done=self.kept,
-                workers=self.jobs,
-                progress=steps,
-            )
+        points = {f"{name}, {fingerprint(model, asdict(each))}": name for name, each in plans.items()}
+        found = run_many(BenchWork(self.actuator, bench), points, **self._options(len(TESTS)))
         return dict(zip(TESTS, found.values(), strict=True))
 
     def family(self, plan: Plan, sets: Mapping[str, Mapping[str, float]]) -> FrequencyResponse:
-        """Every sine of the reference at every place."""
-        with _Steps(self.progress, plan.sines(self.actuator)) as steps:
-            return frequency_response(
-                self.actuator,
-                amplitudes=[part * plan.stroke for part in plan.all_amplitudes],
-                frequencies=sorted(plan.frequencies),
-                seen=(OUTPUT,),
-                inputs=self.inputs,
-                loads=plan.all_biases,
-                sets=sets,
-                workers=self.jobs,
-                done=self.kept,
-                progress=steps,
-            )
+        """Every reference sine at every place."""
+        return frequency_response(
+            self.actuator,
+            amplitudes=[part * plan.stroke for part in plan.all_amplitudes],
+            frequencies=sorted(plan.frequencies),
+            seen=(OUTPUT,),
+            inputs=self.inputs,
+            loads=plan.all_biases,
+            sets=sets,
+            **self._options(plan.sines(self.actuator)),
+        )
 
     def stiffness(self, plan: Plan, torque: float, missing: dict[str, str]) -> dict[str, DynamicStiffness]:
-        """Powered and unpowered; why not goes to `missing`."""
+        """Powered and unpowered; reasons why not go to `missing`."""
         found: dict[str, DynamicStiffness] = {}
         for word in ("powered", "unpowered"):
-            with _Steps(self.progress, len(PARTS) * len(plan.torque_frequencies)) as steps:
-                try:
-                    shaken = self.actuator if word == "powered" else unpowered(self.actuator)
-                except ValueError as error:
-                    missing[f"stiffness, {word}"] = str(error)
-                    continue
-                present = [quantity.name for quantity in shaken.system().inputs]
-                found[word] = dynamic_stiffness(
-                    shaken,
-                    amplitudes=[part * torque for part in PARTS],
-                    frequencies=plan.torque_frequencies,
-                    inputs={name: value for name, value in self.inputs.items() if name in present},
-                    workers=self.jobs,
-                    done=self.kept,
-                    progress=steps,
-                )
+            options = self._options(len(PARTS) * len(plan.torque_frequencies))
+            try:
+                shaken = self.actuator if word == "powered" else unpowered(self.actuator)
+            except ValueError as error:
+                missing[f"stiffness, {word}"] = str(error)
+                continue
+            present = [quantity.name for quantity in shaken.system().inputs]
+            found[word] = dynamic_stiffness(
+                shaken,
+                amplitudes=[part * torque for part in PARTS],
+                frequencies=plan.torque_frequencies,
+                inputs={name: value for name, value in self.inputs.items() if name in present},
+                **options,
+            )
         return found
 
 
 def _checks(plan: Plan, family: FrequencyResponse, place: Place) -> tuple[LimitCheck, ...]:
-    """Every limit of the mask against the sines of its amplitude."""
+    """Check every limit of the mask against the sines of its amplitude."""
     found: list[LimitCheck] = []
     for limit in plan.mask.limits:
         where = {"set": place.corner, "load": place.bias, "amplitude": limit.amplitude * plan.stroke}
         response, moves = (family.select(name, **where).values for name in ("response", "moves"))
-        found += checked(limit, family.data.frequency.values, response, moves.astype(bool))
+        found += check_limit(limit, family.data.frequency.values, response, moves.astype(bool))
     return tuple(found)
-
-
-class _Steps:
-    """Turns the counts of `run_many` into steps of a bar, and makes them complete where all was done before."""
-
-    def __init__(self, progress: Callable[[int], None], count: int) -> None:
-        self.progress, self.left = progress, count
-
-    def __call__(self, done: int, count: int) -> None:
-        """What `run_many` calls."""
-        self.progress(self.left - (count - done))
-        self.left = count - done
-
-    def __enter__(self) -> "_Steps":
-        return self
-
-    def __exit__(self, kind: type | None, *rest: Any) -> None:
-        if kind is None:
-            self.progress(self.left)

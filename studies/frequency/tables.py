@@ -13,19 +13,19 @@ import xarray
 from actuator import LiftedMargins
 from actuator.linear.bode import to_db
 from studies.frequency.plan import Plan
-from studies.frequency.study import Study
+from studies.frequency.study import CaseResponse
 
 HARMONICS = range(2, 8)  # that have a column
 
 
 def write_rows(path: Path, rows: Iterable[Sequence[Any]]) -> None:
-    """Write a CSV file, names first."""
+    """Write a CSV file, with the names in its first row."""
     with path.open("w", newline="", encoding="utf-8") as file:
         csv.writer(file).writerows(rows)
 
 
-def response_rows(plan: Plan, studies: Sequence[Study]) -> Iterable[Sequence[Any]]:
-    """Every sine of the reference."""
+def response_rows(plan: Plan, studies: Sequence[CaseResponse]) -> Iterable[Sequence[Any]]:
+    """Every reference sine."""
     yield (
         "case", "corner", "bias_Nm", "amplitude_rad", "amplitude_of_stroke", "frequency_Hz", "gain_db", "phase_deg",
         "mean_rad", *(f"harmonic_{k}_of_fundamental" for k in HARMONICS), "distortion", "moves", "settled", "stuck",
@@ -58,7 +58,7 @@ def response_rows(plan: Plan, studies: Sequence[Study]) -> Iterable[Sequence[Any
             )
 
 
-def stiffness_rows(studies: Sequence[Study]) -> Iterable[Sequence[Any]]:
+def stiffness_rows(studies: Sequence[CaseResponse]) -> Iterable[Sequence[Any]]:
     """Every sine of torque on the load."""
     yield (
         "case", "state", "amplitude_Nm", "frequency_Hz", "compliance_rad_per_Nm", "stiffness_Nm_per_rad",
@@ -85,7 +85,7 @@ def stiffness_rows(studies: Sequence[Study]) -> Iterable[Sequence[Any]]:
                     )
 
 
-def margin_rows(studies: Sequence[Study]) -> Iterable[Sequence[Any]]:
+def margin_rows(studies: Sequence[CaseResponse]) -> Iterable[Sequence[Any]]:
     """Every crossing of every loop in every mode."""
     yield ("case", "loop", "mode", "quantity", "frequency_Hz", "value", "unit")
     for study in studies:
@@ -111,7 +111,7 @@ def margin_rows(studies: Sequence[Study]) -> Iterable[Sequence[Any]]:
 
 
 def write_netcdf(path: Path, found: Mapping[str, xarray.Dataset]) -> None:
-    """All cases in one file; complex numbers as two, and no words but the names of the axes."""
+    """Write all cases into one file; complex numbers as two, and no texts but the names of the axes."""
     parts: list[xarray.Dataset] = []
     for data in found.values():
         kept = data.drop_vars([name for name in data.variables if name in ("note", "unit")])

@@ -1,73 +1,69 @@
 """The command `hunting`."""
 
-import contextlib
-import time
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
 
-from studies.cache import Kept, kept_in
 from studies.cases import built_in
-from studies.commands import JOBS, RESUMES, announce, out_option, refusing
-from studies.files import CaseError
+from studies.corners import ROLES
 from studies.findings import Findings
 from studies.hunting.map import Plan
-from studies.hunting.study import DATA, WrongPlan, hunting_map, plan_of
+from studies.hunting.study import DATA, hunting_map, make_plan
+from studies.study import Work, study
 
 AXIS = (str, float, float, click.IntRange(1))
+METAVAR = "NAME FROM TO COUNT"
 
 
-@click.command(
-    epilog="A name with * is a factor on every parameter of that pattern, patterns may be added with +: "
-    f"'*.breakaway+*.static'; =PATTERN sets them all to one value. All else is in SI units. {RESUMES}"
+@dataclass(frozen=True, kw_only=True)
+class HuntingMap:
+    """Where a case hunts.
+
+    Parameters
+    ----------
+    plan : Plan
+        What is varied.
+    exact : bool
+        Whether the exact boundary is continued along the axis that is one parameter.
+    """
+
+    plan: Plan
+    exact: bool = False
+    title: str = "Hunting map"
+
+    def run(self, work: Work) -> Findings:
+        """Compute the map."""
+        return hunting_map(self.plan, work, exact=self.exact)
+
+
+@study(
+    "hunting",
+    first=DATA,
+    epilog="NAME is a parameter, in SI units. It may contain *: values then multiply all matching parameters. Join "
+    "patterns with +, such as '*.coulomb+*.sliding'; =PATTERN assigns the value instead. The words "
+    f"{', '.join(ROLES)} multiply all parameters with that role, whatever their names. Breakaway friction is not "
+    "reduced below the sliding friction of its contact.",
 )
 @click.argument("case", default="aileron", metavar="[CASE | PATH.toml]")
-@click.option("--x", type=AXIS, default=None, metavar="NAME FROM TO COUNT", help="Default: the integral gain.")
-@click.option("--y", type=AXIS, default=None, metavar="NAME FROM TO COUNT", help="Default: all breakaway friction.")
-@click.option("--corner", "corners", multiple=True, metavar="NAME=VALUE,...", help="A set of parameters; repeatable.")
+@click.option("--x", type=AXIS, default=None, metavar=METAVAR, help="Horizontal axis.  [default: the integral gain]")
+@click.option("--y", type=AXIS, default=None, metavar=METAVAR, help="Vertical axis.  [default: breakaway 0.5 2 8]")
+@click.option("--corner", "corners", multiple=True, metavar="[LABEL:] NAME=VALUE,...",
+              help="Set of parameters for which a map is computed; repeatable.")  # fmt: skip
 @click.option("--duration", type=click.FloatRange(0, min_open=True), default=None,
-              help="Of each run [s].  [default: that of the case]")  # fmt: skip
-@click.option("--exact", is_flag=True, help="Follow the exact boundary along the axis that is one parameter.")
-@JOBS
-@out_option("hunting")
-@click.pass_context
+              help="Duration of each run [s].  [default: that of the case]")  # fmt: skip
+@click.option("--exact", is_flag=True, help="Continue the exact boundary along an axis that is a single parameter.")
 def hunting(  # noqa: PLR0913, PLR0917 - one per option
-    context: click.Context,
     case: str,
     x: tuple | None,
     y: tuple | None,
     corners: tuple[str, ...],
     duration: float | None,
     exact: bool,
-    jobs: int,
-    out: Path | None,
-) -> None:
+) -> HuntingMap:
     """Map where a case hunts, over two parameters and any number of corners.
 
-    A point hunts if it does so in the scenario of the case, or after one more step of a fiftieth of the way.
+    A point counts as hunting if the scenario, or a further step of 2 % of it, ends in a cycle.
     """
-    folder = out or context.obj / "hunting"
-    with refusing(folder, CaseError, WrongPlan):
-        plan = plan_of(case if case in built_in() else Path(case), x=x, y=y, corners=corners, duration=duration)
-        kept = kept_in(folder)
-        before, began = len(kept), time.perf_counter()
-        found = _mapped(plan, kept, exact, jobs)
-        new, seconds = len(kept) - before, time.perf_counter() - began
-        written = found.save(folder)
-    cost = f"{new} results are new, found in {seconds:.3g} s; all others were in {kept.path}"
-    announce([*found.text, cost], written, DATA)
-
-
-def _mapped(plan: Plan, kept: Kept, exact: bool, jobs: int) -> Findings:
-    """The map, with a bar for its points and one for the ends of exact families."""
-    with contextlib.ExitStack() as bars:
-        points = bars.enter_context(click.progressbar(length=len(plan.indices()), label="Points"))
-        ends = []
-
-        def advance(done: int, count: int) -> None:
-            if not ends:
-                points.render_finish()
-                ends.append(bars.enter_context(click.progressbar(length=count, label="Exact boundary")))
-            ends[0].update(done)
-
-        return hunting_map(plan, kept, jobs=jobs, exact=exact, progress=points.update, progress_of_ends=advance)
+    source = case if case in built_in() else Path(case)
+    return HuntingMap(plan=make_plan(source, x=x, y=y, corners=corners, duration=duration), exact=exact)

@@ -1,7 +1,8 @@
-"""The exact boundary in a map: where the family of orbits through its hunting points ends, along one axis."""
+"""The exact boundary in a map: where, along one axis, the family of orbits through its hunting points ends."""
 
 import math
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -9,33 +10,31 @@ import numpy as np
 from actuator import NoOrbit, SimulationError, continue_orbit, find_orbit
 from actuator.continuation.bifurcations import BOUND
 from actuator.verdict.verdict import CYCLES, IRREGULAR, REST, UNDECIDED
-from studies.cache import Stages
-from studies.corners import meaning
-from studies.hunting.map import Index, Plan, load, made_once, seen_at
+from studies.cache import Steps
+from studies.hunting.map import Index, Plan, compute_at, judge_point, load
 
 if TYPE_CHECKING:
     import xarray
 
-NO_END, GOES_ON = "no orbit", "goes on"
+NO_END, CONTINUES = "no orbit", "continues"
 
 
 class EndPoint(NamedTuple):
-    """Where the family ends along an axis, and how; nan and why where no end was found."""
+    """Where along an axis the family ends, and how; nan and the reason where no end was found."""
 
     value: float
     kind: str
     reason: str
 
 
-def along(plan: Plan) -> str:
+def find_axis(plan: Plan) -> str:
     """The axis that is the value of one parameter, "x" before "y"; empty where neither is."""
-    system = load(plan.case).actuator.system()
-    return next((name for name in ("x", "y") if meaning(system, getattr(plan, name).name).single), "")
+    return next((name for name in ("x", "y") if plan.selection(getattr(plan, name)).single), "")
 
 
-def crossings(plan: Plan, points: Mapping[Index, Mapping[str, Any]]) -> list[Index]:
-    """One hunting point beside one without a cycle along the axis, for every line of the map that has such a pair."""
-    axis = along(plan)
+def find_crossings(plan: Plan, points: Mapping[Index, Mapping[str, Any]]) -> list[Index]:
+    """For every line of the map along the axis that has one, a hunting point next to a point without a cycle."""
+    axis = find_axis(plan)
     if not axis:
         return []
     found: dict[tuple[int, int], Index] = {}
@@ -54,39 +53,44 @@ def _beside(index: Index, axis: str) -> Index:
     return (corner, j, i + 1) if axis == "x" else (corner, j + 1, i)
 
 
-def end_of(plan: Plan, index: Index) -> EndPoint:
-    """Follow the cycle of a hunting point towards both ends of the axis, to the nearest end of its family."""
-    case, axis = load(plan.case), getattr(plan, along(plan))
+def find_end(plan: Plan, index: Index) -> EndPoint:
+    """Continue the cycle of a hunting point toward both ends of the axis, to the nearest end of its family."""
+    case, axis = load(plan.case), getattr(plan, find_axis(plan))
     try:
-        orbit = find_orbit(case.actuator, seen_at(plan, index).run)
+        orbit = find_orbit(case.actuator, judge_point(plan, index).run)
         ends = []
         bounds = (min(axis.values), max(axis.values))
-        for upward in _ways(plan, index):
+        for upward in _directions(plan, index):
             branch = continue_orbit(orbit, axis.name, bounds, upward=upward)
             ends.append(EndPoint(float(branch.end.value), branch.end.kind, branch.end.reason))
     except (NoOrbit, SimulationError) as error:
         return EndPoint(math.nan, NO_END, str(error))
     inside = [end for end in ends if end.kind != BOUND]
-    return inside[0] if inside else EndPoint(math.nan, GOES_ON, "the family goes on to the ends of the axis")
+    return inside[0] if inside else EndPoint(math.nan, CONTINUES, "the family continues to the ends of the axis")
 
 
-def _ways(plan: Plan, index: Index) -> tuple[bool, ...]:
-    """Directions to follow in: not from an end of the axis outward."""
-    axis = getattr(plan, along(plan))
-    value = axis.values[index[2] if along(plan) == "x" else index[1]]
+def _directions(plan: Plan, index: Index) -> tuple[bool, ...]:
+    """Directions of continuation: not from an end of the axis outward."""
+    axis = getattr(plan, find_axis(plan))
+    value = axis.values[index[2] if find_axis(plan) == "x" else index[1]]
     return tuple(up for up in (False, True) if value != (max if up else min)(axis.values))
 
 
-def ends(
-    plan: Plan, indices: list[Index], stages: Stages, *, jobs: int, progress: Callable[[int], None]
+def find_ends(
+    plan: Plan,
+    indices: list[Index],
+    steps: Steps,
+    *,
+    jobs: int,
+    progress: Callable[[int, int], None] | None = None,
 ) -> dict[Index, EndPoint]:
-    """Ends of the families through hunting points, each found once."""
-    return made_once(end_of, EndPoint, "end", plan, indices, stages, jobs=jobs, progress=progress)
+    """Ends of the families through hunting points; parameters as of `run_many`."""
+    return compute_at(partial(find_end, plan), EndPoint, "end", indices, steps, jobs=jobs, progress=progress)
 
 
-def with_boundary(plan: Plan, data: "xarray.Dataset", found: Mapping[Index, EndPoint]) -> "xarray.Dataset":
-    """The map with the exact boundary: values on the axis that it was followed along, over the other."""
-    axis = along(plan)
+def add_boundary(plan: Plan, data: "xarray.Dataset", found: Mapping[Index, EndPoint]) -> "xarray.Dataset":
+    """The map with the exact boundary: values on the axis along which it was continued, over the other axis."""
+    axis = find_axis(plan)
     if not axis:
         return data
     other = "y" if axis == "x" else "x"

@@ -1,22 +1,22 @@
-"""A map of hunting over two names and any number of corners: every point simulated and classified, on all cores."""
+"""A map of hunting over two settings and any number of corners: every point simulated and classified."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import as_completed
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from actuator import SimulationError
-from actuator.simulation.many import processes
+from actuator.simulation.many import run_many
 from actuator.simulation.run import Run
 from actuator.verdict.verdict import FAILED, REST, Hunting, Verdict, decide
-from studies.cache import Stages, actuator_of
+from studies.cache import Steps, fingerprint
 from studies.cases import Case, load_case
-from studies.corners import Setting, meaning, parameters_of
+from studies.corners import AS_IS, CornerSettings, Selection, Setting, find_corner, select
+from studies.files import StudyError
 
 if TYPE_CHECKING:
     import xarray
@@ -25,18 +25,18 @@ T = TypeVar("T")
 Index = tuple[int, int, int]  # corner, row, column
 LABELS = tuple(Verdict)
 POINTS = 5000  # output points of a run
-SMALL = 0.02  # part of the way gone so far: the further step that what rests is given
+FURTHER_STEP = 0.02  # part of the travel so far: the further step given to a run that came to rest
 LONGEST = 4.0  # times the duration that a point may take to be decided
 NUMBERS = {  # what is kept of a point besides its verdict: unit, and what it is
     "amplitude": ("rad", "half of peak to peak at the load, of a cycle"),
     "motor_amplitude": ("rad", "half of peak to peak at the motor, of a cycle"),
     "period": ("s", "period of a cycle"),
-    "stick_fraction": ("-", "part of the period in which every contact is stuck"),
-    "standing_error": ("rad", "reference less load, at rest or in the mean of a cycle"),
+    "stick_fraction": ("-", "part of the period with every contact stuck"),
+    "standing_error": ("rad", "reference less load angle, at rest or averaged over a cycle"),
     "reversals": ("1/h", "reversals of the load"),
-    "travel": ("rad/h", "way of the load, forward and backward"),
-    "current_rms": ("A", "effective value of the current"),
-    "mean_loss": ("W", "heat of motor, inverter and gear"),
+    "travel": ("rad/h", "travel of the load, forward and backward"),
+    "current_rms": ("A", "rms current"),
+    "mean_loss": ("W", "losses of motor, inverter and gear"),
 }
 
 
@@ -71,8 +71,8 @@ class Plan:
         A built-in case or a file.
     x, y : Axis
         What is varied.
-    corners : tuple of tuple of Setting
-        Each a set of parameters; one empty one for the case as it is.
+    corners : tuple of CornerSettings
+        Sets of parameters; by default the case as it is.
     duration : float or None
         Of each run [s]; None for that of the case.
     """
@@ -80,7 +80,7 @@ class Plan:
     case: str | Path
     x: Axis
     y: Axis
-    corners: tuple[tuple[Setting, ...], ...] = ((),)
+    corners: tuple[CornerSettings, ...] = (CornerSettings(AS_IS),)
     duration: float | None = None
 
     def indices(self) -> list[Index]:
@@ -88,76 +88,79 @@ class Plan:
         shape = (len(self.corners), len(self.y.values), len(self.x.values))
         return [(c, j, i) for c, j, i in np.ndindex(shape)]
 
-    def settings(self, index: Index) -> tuple[Setting, ...]:
-        """All settings of a point."""
+    def parameters(self, index: Index) -> dict[str, float]:
+        """The parameters of a point that differ from the case; StudyError where they break a rule."""
         corner, j, i = index
-        return (
-            *self.corners[corner],
-            Setting(self.y.name, self.y.values[j]),
-            Setting(self.x.name, self.x.values[i]),
-        )
+        axes = Setting(self.y.name, self.y.values[j]), Setting(self.x.name, self.x.values[i])
+        at = CornerSettings(self.label(corner), (*self.corners[corner].settings, *axes))
+        return find_corner(load(self.case).actuator.system(), at).parameters
+
+    def selection(self, axis: Axis) -> Selection:
+        """The parameters that an axis varies."""
+        return select(load(self.case).actuator.system().parameters, axis.name)
 
     def label(self, corner: int) -> str:
-        """A corner in words."""
-        return ", ".join(f"{name}={value:g}" for name, value in self.corners[corner]) or "as it is"
+        """The name of a corner."""
+        return self.corners[corner].name
 
     def fingerprint(self) -> str:
-        """Of all that decides the points."""
-        case = load(self.case)
-        plan = (self.x, self.y, self.corners, self.duration or case.duration)
-        return actuator_of(case.actuator, case.inputs, plan)
+        """A hash of all that the points depend on."""
+        case, settings = load(self.case), [corner.settings for corner in self.corners]
+        return fingerprint(case.actuator, case.inputs, self.x, self.y, settings, self.duration or case.duration)
 
     def check(self) -> None:
-        """Raise KeyError or ValueError where a name is unknown or a value breaks a rule of its component."""
-        system = load(self.case).actuator.system()
+        """Raise StudyError where a name is unknown or a value breaks a rule of its component."""
         if self.x.name == self.y.name:
-            raise ValueError(f"both axes are {self.x.name!r}; choose two")
+            raise StudyError(f"both axes are {self.x.name!r}; choose two")
         for index in self.indices():
-            system.parameter_values(parameters_of(system, self.settings(index)))
+            self.parameters(index)
 
 
 @cache
 def load(case: str | Path) -> Case:
-    """A case, built once in every process."""
+    """Load a case, once in every process."""
     return load_case(case)
 
 
-class Seen(NamedTuple):
-    """The last run of a point, the verdict on it, and why."""
+class Judged(NamedTuple):
+    """The last run of a point, its verdict, and the reason."""
 
     run: Run
     hunting: Hunting
     reason: str
 
 
-def seen_at(plan: Plan, index: Index) -> Seen:
+def judge_point(plan: Plan, index: Index) -> Judged:
     """Simulate and classify one point.
 
-    Rest and a cycle may exist side by side, and a large step often ends at rest by chance: what rests is given a small
-    step more, behind which the integrator must build up until stiction lets go.
+    Rest and a cycle may coexist, and a large step often ends at rest by chance: a run that comes to rest is given a
+    further small step, after which the integrator must build up until stiction breaks away.
     """
     case = load(plan.case)
     duration = plan.duration or case.duration
-    parameters = parameters_of(case.actuator.system(), plan.settings(index))
-    options: dict[str, Any] = {"parameters": parameters, "resolution": duration / POINTS, "longest": LONGEST}
+    options: dict[str, Any] = {
+        "parameters": plan.parameters(index),
+        "resolution": duration / POINTS,
+        "longest": LONGEST,
+    }
     run, found = decide(case.actuator, duration, inputs=case.inputs, **options)
     if found.verdict == REST and "reference" in run.signals:
         held = {quantity.name: float(run[quantity.name][-1]) for quantity in run.system.inputs}
-        step = SMALL * float(abs(run["load_angle"]).max())
+        step = FURTHER_STEP * float(abs(run["load_angle"]).max())
         held["reference"] += step
         again = decide(case.actuator, duration, inputs=held, start=run.state(), **options)
         if again.hunting.cycles:
-            return Seen(*again, f"after a further step of {step:.3g} rad {again.hunting.reason}")
-    return Seen(run, found, found.reason)
+            return Judged(*again, f"after a further step of {step:.3g} rad {again.hunting.reason}")
+    return Judged(run, found, found.reason)
 
 
-def point(plan: Plan, index: Index) -> dict[str, Any]:
-    """What is kept of one point; numbers that there are not are None."""
+def compute_point(plan: Plan, index: Index) -> dict[str, Any]:
+    """Verdict, reason and numbers of one point; None in place of numbers that it does not have."""
     try:
-        seen = seen_at(plan, index)
+        judged = judge_point(plan, index)
     except SimulationError as error:
         return {"verdict": FAILED, "reason": str(error)}
-    return {"verdict": seen.hunting.verdict, "reason": seen.reason, **_numbers(seen.hunting)}
+    return {"verdict": judged.hunting.verdict, "reason": judged.reason, **_numbers(judged.hunting)}
 
 
 def _numbers(hunting: Hunting) -> dict[str, float | None]:
@@ -177,48 +180,30 @@ def _numbers(hunting: Hunting) -> dict[str, float | None]:
 
 
 def compute(
-    plan: Plan, stages: Stages, *, jobs: int, progress: Callable[[int], None] = lambda count: None
+    plan: Plan, steps: Steps, *, jobs: int, progress: Callable[[int, int], None] | None = None
 ) -> dict[Index, dict[str, Any]]:
-    """All points of a map: those that are kept as they are, the others simulated, and kept as they come.
-
-    `progress` is called with how many more are done.
-    """
-    return made_once(point, dict, "point", plan, plan.indices(), stages, jobs=jobs, progress=progress)
+    """All points of a map: from the cache, or simulated and put there; parameters as of `run_many`."""
+    return compute_at(partial(compute_point, plan), dict, "point", plan.indices(), steps, jobs=jobs, progress=progress)
 
 
-def made_once(  # noqa: PLR0913 - of what, of which, and how
-    function: Callable[[Plan, Index], T],
+def compute_at(  # noqa: PLR0913 - what, where, and how
+    work: Callable[[Index], T],
     kind: type[T],
-    word: str,
-    plan: Plan,
+    name: str,
     indices: Sequence[Index],
-    stages: Stages,
+    steps: Steps,
     *,
     jobs: int,
-    progress: Callable[[int], None],
+    progress: Callable[[int, int], None] | None = None,
 ) -> dict[Index, T]:
-    """What a function of the plan and an index gives for all indices: kept, or made now in several processes and kept.
-
-    The first is made here, which compiles the model for all. What is kept has its `word` and index for a name.
-    """
-    names = {index: f"{word} {index}" for index in indices}
-    left = [index for index in indices if names[index] not in stages]
-    progress(len(indices) - len(left))
-    here = left if jobs == 1 else left[:1]
-    for index in here:
-        stages.keep(names[index], function(plan, index))
-        progress(1)
-    if there := left[len(here) :]:
-        with processes(min(jobs, len(there))) as pool:
-            futures = {pool.submit(function, plan, index): index for index in there}
-            for future in as_completed(futures):
-                stages.keep(names[futures[future]], future.result())
-                progress(1)
-    return {index: stages.read(name, kind) for index, name in names.items()}
+    """The results of some work at indices of a map, each a step called by a name and its index."""
+    points = {f"{name} {index}": index for index in indices}
+    found = run_many(work, points, done=steps.results(kind), workers=jobs, first_here=True, progress=progress)
+    return dict(zip(indices, found.values(), strict=True))
 
 
 def dataset(plan: Plan, points: Mapping[Index, Mapping[str, Any]]) -> "xarray.Dataset":
-    """The map as labelled arrays over corner, y and x; words as whole numbers, told by `flag_meanings`."""
+    """The map as labeled arrays over corner, y and x; verdicts as integers, named by `flag_meanings`."""
     import xarray
 
     system = load(plan.case).actuator.system()
@@ -236,8 +221,13 @@ def dataset(plan: Plan, points: Mapping[Index, Mapping[str, Any]]) -> "xarray.Da
     for name, (unit, text) in NUMBERS.items():
         variables[name] = (dimensions, numbers[name], {"units": unit, "long_name": text})
     for axis, along in (("x", plan.x), ("y", plan.y)):
-        kind = meaning(system, along.name)
-        named = {"long_name": along.name, "units": kind.unit, "parameters": " ".join(kind.parameters)}
+        chosen = plan.selection(along)
+        named = {
+            "long_name": along.name,
+            "units": chosen.unit,
+            "parameters": " ".join(chosen.parameters),
+            "factor": np.int8(chosen.factor),
+        }
         variables[axis] = (axis, np.array(along.values), named)
     corners = np.arange(shape[0], dtype=np.int32)
     labels = [plan.label(k) for k in range(shape[0])]
@@ -248,5 +238,5 @@ def dataset(plan: Plan, points: Mapping[Index, Mapping[str, Any]]) -> "xarray.Da
 
 
 def flags(labels: Iterable[str]) -> str:
-    """Words of a coded variable, as the CF conventions have them: blanks between them, none in them."""
+    """Names of the values of a coded variable as of the CF conventions: separated by blanks, none within."""
     return " ".join(label.replace(", ", ",").replace(" ", "_") for label in labels)

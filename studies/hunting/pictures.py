@@ -37,7 +37,7 @@ def plot_map(data: "xarray.Dataset", corner: int, label: str) -> Figure:
 
 
 def _label(axis: "xarray.DataArray") -> str:
-    if axis.units == "-" and "*" in axis.long_name:
+    if axis.factor:
         return f"factor on {axis.long_name}"
     return f"{axis.long_name.removeprefix('=')} in {axis.units}"
 

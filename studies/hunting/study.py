@@ -1,32 +1,27 @@
-"""Where does it hunt? A map over two names and any number of corners, with pictures, numbers and a data set."""
+"""Where does it hunt? A map over two settings and any number of corners, with pictures, numbers and a data set."""
 
 import math
 from collections import Counter
-from collections.abc import Callable, MutableMapping
-from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from actuator.diagnosis.causes import INTEGRALS
-from actuator.verdict.verdict import FAILED
-from studies.cache import Stages
-from studies.corners import setting_of
+from actuator.verdict.verdict import CYCLES, FAILED
+from studies.cache import Steps
+from studies.corners import AS_IS, ROLES, CornerSettings, read_corners
+from studies.files import StudyError
 from studies.findings import Findings
-from studies.hunting.ends import CYCLES, EndPoint, along, crossings, ends, with_boundary
+from studies.hunting.ends import EndPoint, add_boundary, find_axis, find_crossings, find_ends
 from studies.hunting.map import LABELS, Axis, Plan, compute, dataset, load
 from studies.hunting.pictures import plot_map
+from studies.study import Work
 
-BREAKAWAY = ("*.breakaway", "*.static")
 DEFAULT_X = (0.1, 2.0, 12)  # of the integral gain of the case: first, last, count
 DEFAULT_Y = (0.5, 2.0, 8)  # of all breakaway friction
 DATA = "hunting.nc"
+POINTS_SHARE = 0.7  # of the work, where the exact boundary follows
 
 
-class WrongPlan(ValueError):
-    """A map that cannot be made; the message is one line."""
-
-
-def plan_of(  # noqa: PLR0913 - a map has this many choices
+def make_plan(  # noqa: PLR0913 - a map has this many choices
     case: str | Path,
     *,
     x: tuple[str, float, float, int] | None = None,
@@ -34,70 +29,53 @@ def plan_of(  # noqa: PLR0913 - a map has this many choices
     corners: tuple[str, ...] = (),
     duration: float | None = None,
 ) -> Plan:
-    """The plan of a map, checked; without axes the integral gain over the breakaway friction.
+    """The plan of a map, checked; by default the integral gain over all breakaway friction.
 
     Raises
     ------
-    WrongPlan
+    StudyError
         For a name that is unknown or a value that breaks a rule.
     """
     system = load(case).actuator.system()
-    values = {parameter.name: float(parameter.default) for parameter in system.parameters}
-    integral = next((name for name in INTEGRALS if values.get(name)), None)
-    if x is None and integral is None:
-        raise WrongPlan(f"{system.name} has no integral gain to vary; choose two names with --x and --y")
     if x is None:
+        acting = [each for each in ROLES["integral"](system.parameters) if each.default]
+        if not acting:
+            raise StudyError(f"{system.name} has no integral gain to vary; choose two names with --x and --y")
         first, last, count = DEFAULT_X
-        gain = values[str(integral)]
-        x = (str(integral), first * gain, last * gain, count)
+        if len(acting) == 1:
+            gain = float(acting[0].default)
+            x = (acting[0].name, first * gain, last * gain, count)
+        else:
+            x = ("integral", *DEFAULT_X)
     if y is None:
-        present = [pattern for pattern in BREAKAWAY if any(fnmatchcase(name, pattern) for name in values)]
-        if not present:
-            raise WrongPlan(f"{system.name} has no breakaway friction to vary; choose another name with --y")
-        y = ("+".join(present), *DEFAULT_Y)
-    axes = [Axis.between(*x), Axis.between(*y)]
-    try:
-        sets = tuple(tuple(setting_of(part) for part in corner.split(",")) for corner in corners) or ((),)
-        plan = Plan(case=case, x=axes[0], y=axes[1], corners=sets, duration=duration)
-        plan.check()
-    except (KeyError, ValueError) as error:
-        raise WrongPlan(str(error.args[0])) from None
+        if not ROLES["breakaway"](system.parameters):
+            raise StudyError(f"{system.name} has no breakaway friction to vary; choose another name with --y")
+        y = ("breakaway", *DEFAULT_Y)
+    at = read_corners(corners) or (CornerSettings(AS_IS),)
+    plan = Plan(case=case, x=Axis.between(*x), y=Axis.between(*y), corners=at, duration=duration)
+    plan.check()
     return plan
 
 
-def hunting_map(
-    plan: Plan,
-    kept: MutableMapping[str, dict[str, Any]],
-    *,
-    jobs: int,
-    exact: bool = False,
-    progress: Callable[[int], None] = lambda count: None,
-    progress_of_ends: Callable[[int, int], None] = lambda done, count: None,
-) -> Findings:
-    """Make a map, or finish one that was begun.
+def hunting_map(plan: Plan, work: Work, *, exact: bool = False) -> Findings:
+    """Compute a map, or finish one that was begun.
 
     Parameters
     ----------
     plan : Plan
         What is varied.
-    kept : mutable mapping of str to dict
-        Finished points and ends.
-    jobs : int
-        Processes.
+    work : Work
+        Cache, processes and progress.
     exact : bool
-        Whether the exact boundary is followed along the axis that is one parameter.
-    progress : callable
-        Called with how many more points are done.
-    progress_of_ends : callable
-        Called with how many more ends of how many in all are found.
+        Whether the exact boundary is continued along the axis that is one parameter.
     """
-    stages = Stages(kept, plan.fingerprint())
-    points = compute(plan, stages, jobs=jobs, progress=progress)
+    steps, share = Steps(work.cache, plan.fingerprint()), POINTS_SHARE if exact else 1.0
+    points = compute(plan, steps, jobs=work.jobs, progress=work.part(0.0, share))
     data, found = dataset(plan, points), {}
     if exact:
-        begun = crossings(plan, points)
-        found = ends(plan, begun, stages, jobs=jobs, progress=lambda done: progress_of_ends(done, len(begun)))
-        data = with_boundary(plan, data, found)
+        starts = find_crossings(plan, points)
+        found = find_ends(plan, starts, steps, jobs=work.jobs, progress=work.part(share, 1.0))
+        data = add_boundary(plan, data, found)
     corners = range(len(plan.corners))
     names = ["hunting_map"] if len(plan.corners) == 1 else [f"hunting_map_{k + 1}" for k in corners]
     return Findings(
@@ -136,8 +114,8 @@ def _sentences(plan: Plan, points: dict, found: dict[tuple, EndPoint], exact: bo
     failed = [point["reason"] for point in points.values() if point["verdict"] == FAILED]
     if failed:
         text.append(f"{len(failed)} simulations could not be completed; the first: {failed[0]}")
-    if exact and not along(plan):
-        text.append("No exact boundary: neither axis is the value of one parameter.")
+    if exact and not find_axis(plan):
+        text.append("No exact boundary: neither axis is a single parameter.")
     known = [end for end in found.values() if math.isfinite(end.value)]
     if found:
         kinds = ", ".join(f"{kind} at {count}" for kind, count in Counter(end.kind for end in known).most_common())

@@ -1,4 +1,4 @@
-"""A judgment as findings: report.html with the pictures inside, the pictures, result.json."""
+"""A judgment as findings: sentences, report.html with the pictures inside, the pictures, result.json."""
 
 import math
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ from actuator.orbits.sampled import PeriodicOrbit
 from actuator.plots.bode import plot_loops
 from actuator.plots.runs import plot_run
 from actuator.stiction.margins import MOST
-from studies.findings import Findings, finite, rendered, versions
+from studies.findings import Findings, finite, render, versions
 from studies.judge.study import Insight, Judgment
 
 if TYPE_CHECKING:
@@ -21,20 +21,49 @@ STEP_VIEW = 1.5  # s of the step that are shown
 CYCLES_VIEW = 3.5  # periods of a cycle that are shown
 
 
-def case_findings(judgment: Judgment, text: list[str]) -> Findings:
+def case_findings(judgment: Judgment) -> Findings:
     """All that is known of one case."""
     result = result_of(judgment)
-    return Findings(pictures=figures(judgment), result=result, text=text, page=partial(_html, judgment, result))
+    return Findings(
+        pictures=figures(judgment), result=result, text=sentences(judgment), page=partial(_html, judgment, result)
+    )
+
+
+def sentences(judgment: Judgment) -> list[str]:
+    """Verdict, margins, causes and the best countermeasure."""
+    hunting, insight = judgment.hunting, judgment.insight
+    text = [f"verdict: {hunting.verdict} ({hunting.reason})"]
+    if hunting.cycles:
+        text.append(
+            f"period {hunting.period_s:.4g} s, amplitude {hunting.amplitude_rad * 1e3:.4g} mrad at the load, "
+            f"stuck for {hunting.stick_fraction:.0%} of the time"
+        )
+    for kind, margin in insight.margins.items():
+        no = (
+            f"no factor up to {MOST:g} makes it hunt"
+            if margin.factor
+            else f"no factor down to 1/{MOST:g} ends the hunting"
+        )
+        known = f"{margin.db:+.1f} dB (factor {margin.factor:.3g})"
+        text.append(f"{kind} margin: {known if math.isfinite(margin.db) else no}")
+    for what, why in insight.missing.items():
+        text.append(f"{'margins, causes and countermeasures' if what == 'all' else what} not computed: {why}")
+    if insight.causes:
+        text.append(insight.causes.sentence())
+    if insight.remedies:
+        best = insight.remedies.ranked[0]
+        text.append(f"best countermeasure: {' '.join((best.name, best.setting)).strip()} ({best.does})")
+    return text
 
 
 def figures(judgment: Judgment) -> "dict[str, Figure]":
-    """The pictures of a judgment by file name."""
+    """The pictures of a judgment by name."""
     run, hunting = judgment.run, judgment.hunting
     signals = [name for name in ("motor_angle_at_load", "load_angle", "reference", "current") if name in run.signals]
     end = float(run.t[-1])
     found = {"step": plot_run(run, signals, span=(0.0, min(STEP_VIEW, end)))}
     error = [name for name in ("position_error", "current", "motor_torque") if name in run.signals]
-    # what rests is shown from the start: its last half is rounding
+    # a run that comes to rest is shown from the start: its last half is rounding
     since = end - CYCLES_VIEW * hunting.period_s if hunting.cycles else 0.0
     found["hunting"] = plot_run(run, error, span=(max(0.0, since), end))
     names = next((list(model.loops) for model in judgment.models if model.loops), [])
@@ -133,9 +162,9 @@ def _remedy(remedy: Remedy) -> dict[str, Any]:
 
 def _html(judgment: Judgment, result: dict[str, Any], pictures: Mapping[str, str]) -> str:
     table = judgment.insight.remedies
-    return rendered(
+    return render(
         "report.html",
-        {"margin": _shown},
+        {"margin": _format},
         case=judgment.case,
         hunting=judgment.hunting,
         models=judgment.models,
@@ -149,6 +178,6 @@ def _html(judgment: Judgment, result: dict[str, Any], pictures: Mapping[str, str
     )
 
 
-def _shown(value: float, digits: int = 3) -> str:
+def _format(value: float, digits: int = 3) -> str:
     """A number for a table; a dash where there is no crossing."""
     return f"{value:.{digits}g}" if math.isfinite(value) else "–"

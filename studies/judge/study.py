@@ -1,8 +1,8 @@
-"""Judge one case: simulate it, say whether it hunts, and linearize it in every contact mode."""
+"""Judge one case: simulate it, classify its motion, linearize it in every contact mode, and explain its hunting."""
 
 import contextlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, MutableMapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, get_type_hints
@@ -33,9 +33,9 @@ from actuator.orbits.sampled import PeriodicOrbit, SampledOrbit
 from actuator.simulation.many import processes
 from actuator.simulation.signals import piece_at
 from actuator.stiction.margins import HuntingMargin, MarginKind, find_scaled, hunting_margin
-from actuator.system.builder import PREFIX
 from actuator.verdict.verdict import DIVERGING
-from studies.cache import CONVERTER, Missing, Stages, actuator_of
+from gear.quantities.roles import LoopSignal
+from studies.cache import CONVERTER, StepError, Steps, fingerprint
 from studies.cases import Case
 
 MODES = ("stuck", "forward", "backward")
@@ -108,17 +108,12 @@ class Judgment:
     insight: Insight
 
 
-def fingerprint_of(case: Case) -> str:
-    """Of all in a case that a judgment depends on."""
-    return actuator_of(case.actuator, case.inputs, case.duration)
-
-
 def judge(
     case: Case,
     progress: Callable[[float], None] | None = None,
     *,
     thorough: bool = False,
-    stages: Stages | None = None,
+    cache: MutableMapping[str, dict[str, Any]] | None = None,
 ) -> Judgment:
     """Simulate, classify and linearize a case; where it hunts, say why, how far it is from rest, and what helps.
 
@@ -130,8 +125,8 @@ def judge(
         Called with the share of the work that is done, 0 to 1.
     thorough : bool
         Whether what needs many runs is done even where one takes long.
-    stages : Stages or None
-        Where orbit, margins, causes and remedies are kept; the run and the linear models are quickly made again.
+    cache : mutable mapping of str to dict or None
+        For orbit, margins, causes and remedies; the run and the linear models are quickly computed again.
     """
     tell = progress or (lambda share: None)
     began = time.process_time()
@@ -152,32 +147,34 @@ def judge(
     if case.actuator.controller is None or not hunting.decided or hunting.verdict == DIVERGING:
         insight = Insight()
     elif spent > PATIENCE and not thorough:
-        why = f"a run takes {spent:.2g} s, and this takes a hundred; ask for it with --thorough"
+        why = f"one run takes {spent:.2g} s, and this needs about a hundred; request it with --thorough"
         insight = Insight(missing={"all": why})
     else:
-        inside = _Inside(case, run, hunting, final, stages or Stages())
-        insight = inside.insight(lambda share: tell(MODELED + (1 - MODELED) * share))
+        steps = Steps(cache, fingerprint(case.actuator, case.inputs, case.duration))
+        insight = _Inquiry(case, run, hunting, final, steps).insight(
+            lambda share: tell(MODELED + (1 - MODELED) * share)
+        )
     tell(1.0)
     return Judgment(case=case, run=run, hunting=hunting, models=tuple(models), insight=insight)
 
 
 @dataclass(frozen=True)
-class _Inside:
-    """What the insight into a case is made of."""
+class _Inquiry:
+    """What the insight into a case is computed from."""
 
     case: Case
     run: Run
     hunting: Hunting
     final: dict[str, float]
-    stages: Stages
+    steps: Steps
     missing: dict[str, str] = field(default_factory=dict)
 
     def insight(self, tell: Callable[[float], None]) -> Insight:
-        """All parts, the remedies in a process beside the others."""
+        """Orbit, margins, causes, and the remedies in a process beside the others."""
         with contextlib.ExitStack() as stack:
             search = None
             if self.hunting.cycles:
-                how = {"executor": stack.enter_context(processes(1)), "done": self.stages.of(Remedy)}
+                how = {"executor": stack.enter_context(processes(1)), "done": self.steps.results(Remedy)}
                 search = RemedySearch(self.case.actuator, self.run, **self._options(), **how)
             orbit = self.orbit() if self.hunting.cycles else None
             tell(ORBIT)
@@ -201,11 +198,11 @@ class _Inside:
             return {name: CONVERTER.unstructure(getattr(found, name)) for name in hints}
 
         try:
-            kept = self.stages.get("orbit", dict, numbers, failures=(NoOrbit,))
-        except Missing as reason:
+            found = self.steps.compute("orbit", dict, numbers, failures=(NoOrbit,))
+        except StepError as reason:
             self.missing["orbit"] = str(reason)
             return None
-        values: dict[str, Any] = {name: CONVERTER.structure(kept[name], hint) for name, hint in hints.items()}
+        values: dict[str, Any] = {name: CONVERTER.structure(found[name], hint) for name, hint in hints.items()}
         system = actuator.system()
         if kind is Orbit:
             return Orbit(system=system, map=flow_map(system), **values)
@@ -215,9 +212,9 @@ class _Inside:
         ticks = self.hunting.period_s / self.run.system.tick_period(self.run.parameters)
         if ticks > MOST_TICKS:
             raise NoOrbit(
-                f"a period has {ticks:.0f} ticks of the controller, and closing it exactly takes derivatives through "
-                f"all of them many times: hours; beyond {MOST_TICKS} it is not tried. Period and amplitude are those "
-                "of the run; actuator.find_orbit tries it"
+                f"a period has {ticks:.0f} controller ticks; closing the orbit needs derivatives through all of "
+                f"them many times, which takes hours, and is not tried beyond {MOST_TICKS} ticks. Period and amplitude "
+                "are those of the run; use actuator.find_orbit to try it"
             )
 
     def margins(self) -> dict[str, HuntingMargin]:
@@ -225,27 +222,27 @@ class _Inside:
         found = {}
         for kind in [kind for kind in MarginKind if find_scaled(self.case.actuator.system(), kind)]:
             try:
-                found[kind] = self.stages.get(
+                found[kind] = self.steps.compute(
                     f"{kind} margin",
                     HuntingMargin,
                     partial(hunting_margin, self.case.actuator, kind, inputs=self.final, duration=self.case.duration),
                     failures=(NoOrbit, SimulationError, ValueError),
                 )
-            except Missing as reason:
+            except StepError as reason:
                 self.missing[f"{kind} margin"] = str(reason)
         return found
 
     def causes(self) -> Causes | None:
-        """Why it hunts."""
+        """Why it hunts; None where that cannot be computed."""
         find = partial(find_causes, self.case.actuator, self.run, **self._options())
         try:
-            return self.stages.get("causes", Causes, find, failures=(SimulationError,))
-        except Missing as reason:
+            return self.steps.compute("causes", Causes, find, failures=(SimulationError,))
+        except StepError as reason:
             self.missing["causes"] = str(reason)
             return None
 
     def remedies(self, search: RemedySearch, tell: Callable[[float], None]) -> RemedyTable | None:
-        """What helps."""
+        """Countermeasures, ranked."""
         try:
             return search.finish(tell)
         except SimulationError as error:
@@ -258,15 +255,25 @@ class _Inside:
 
 def _model(case: Case, mode: str, inputs: dict[str, float]) -> LinearModel:
     system = without_counts(case.actuator).system()
-    signals = [quantity.name.removeprefix(PREFIX) for quantity in system.inputs if quantity.name.startswith(PREFIX)]
-    if system.clocks:
-        # those of the slowest clock have margins of their own; the others are renewed several times in its period
-        signals = [name for name in signals if name in ("position", "speed_reference")]
+    signals = [role.signal for quantity in system.inputs if (role := quantity.role(LoopSignal))]
     try:
         point = trim(system, mode, inputs=inputs)
-        loops = {name: loop_transfer(point, name) for name in signals}
+        loops = dict(_loops(point, signals))
     except NoEquilibrium as nothing:
         return LinearModel(mode=mode, reason=str(nothing))
     return LinearModel(
         mode=mode, point=point, loops=loops, margins={name: margins(loop) for name, loop in loops.items()}
     )
+
+
+def _loops(point: OperatingPoint, signals: Sequence[str]) -> Iterator[tuple[str, control.StateSpace]]:
+    """Loop transfers with one input: not of signals that are sampled several times in a period of the slowest."""
+    for name in signals:
+        try:
+            loop = loop_transfer(point, name)
+        except ValueError:  # not held between the ticks of its clock
+            if not point.system.clocks:
+                raise
+            continue
+        if loop.ninputs == 1:
+            yield name, loop

@@ -1,4 +1,4 @@
-"""Monte Carlo over tolerances: how probable is hunting, how probable a missed demand, and which parameters matter.
+"""Monte Carlo over tolerances: probability of hunting and of missed demands, and which parameters matter.
 
 Points are those of Saltelli's scheme, whose first two blocks are random and independent and give the probabilities; all
 blocks together give Sobol' indices of a continuous measure (the amplitude of the cycle, the gain at the bandwidth).
@@ -19,20 +19,22 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from actuator.simulation.many import run_many
-from actuator.stiction.margins import sliding_of
+from actuator.system.parameters import Parameter
 from studies.cache import fingerprint
-from studies.specification import Tolerance, matching
+from studies.corners import Setting, apply_settings
+from studies.files import StudyError
+from studies.specification import Tolerance
 
-TAILS = 1e-3  # of a normal distribution, on each side, that are left out: three sigma
+TAILS = 1e-3  # of a normal distribution, cut off on each side: three sigma
 CONFIDENCE = 0.95
 
 
-class MissingLibrary(ImportError):
+class MissingLibrary(StudyError):
     """SALib is not installed."""
 
 
 class Probability(NamedTuple):
-    """How often something happened, and between which probabilities it lies by Wilson's score."""
+    """Number of events in a number of trials, with Wilson's score interval of their probability."""
 
     happened: int
     trials: int
@@ -41,12 +43,12 @@ class Probability(NamedTuple):
 
     @property
     def value(self) -> float:
-        """The share."""
+        """Observed share."""
         return self.happened / self.trials
 
 
 class Influence(NamedTuple):
-    """Share of the variance of a measure that a parameter has: alone, and with all its interactions; half widths."""
+    """Sobol' indices of a parameter for a measure: first order and total, with half widths of their intervals."""
 
     parameter: str
     alone: float
@@ -57,18 +59,18 @@ class Influence(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Robustness:
-    """What tolerances do.
+    """Effect of tolerances.
 
     Attributes
     ----------
     probabilities : dict of str to Probability
-        By the name of what is missed.
+        By the name of the event.
     influences : dict of str to tuple of Influence
         By the name of the measure, the most influential parameter first.
     points : tuple of dict
         Factors of every point.
     results : tuple of dict
-        What came of it.
+        The result at every point.
     """
 
     probabilities: dict[str, Probability]
@@ -92,43 +94,38 @@ def wilson(happened: int, trials: int, confidence: float = CONFIDENCE) -> Probab
     z = NormalDist().inv_cdf((1 + confidence) / 2)
     middle = (happened + z**2 / 2) / (trials + z**2)
     half = z / (trials + z**2) * math.sqrt(happened * (trials - happened) / trials + z**2 / 4)
-    # the interval of nothing starts at zero; rounding would have it start beside it
+    # the ends are exact at zero and one, where rounding would miss them
     return Probability(
         happened, trials, 0.0 if happened == 0 else middle - half, 1.0 if happened == trials else middle + half
     )
 
 
-def factors(shares: np.ndarray, tolerances: Sequence[Tolerance]) -> np.ndarray:
-    """Factors on the parameters from shares between 0 and 1, (points, tolerances) both."""
-    found = np.empty_like(shares)
+def factors(quantiles: np.ndarray, tolerances: Sequence[Tolerance]) -> np.ndarray:
+    """Factors on the parameters from quantiles between 0 and 1, both (points, tolerances)."""
+    found = np.empty_like(quantiles)
     for k, tolerance in enumerate(tolerances):
         if tolerance.spread == "uniform":
-            found[:, k] = 1 + tolerance.size * (2 * shares[:, k] - 1)
+            found[:, k] = 1 + tolerance.size * (2 * quantiles[:, k] - 1)
         else:
             normal = NormalDist(1.0, tolerance.size)
-            found[:, k] = [normal.inv_cdf(TAILS + (1 - 2 * TAILS) * share) for share in shares[:, k]]
+            found[:, k] = [normal.inv_cdf(TAILS + (1 - 2 * TAILS) * quantile) for quantile in quantiles[:, k]]
     return found
 
 
-def spread(values: Mapping[str, float], tolerances: Sequence[Tolerance], row: Sequence[float]) -> dict[str, float]:
-    """Parameters that differ, from nominal values and factors; breakaway friction is never below sliding friction."""
-    found: dict[str, float] = {}
-    for tolerance, factor in zip(tolerances, row, strict=True):
-        for name in matching(tolerance.parameter, values):
-            found[name] = factor * found.get(name, values[name])
-    now = {**values, **found}
-    for name in values:
-        other = sliding_of(name, values)
-        if other is not None and (name in found or other in found):
-            found[name] = max(now[name], now[other])
-    return found
+def spread(
+    parameters: Sequence[Parameter], nominal: Mapping[str, float], tolerances: Sequence[Tolerance], row: Sequence[float]
+) -> dict[str, float]:
+    """All parameters of one actuator of a production, from nominal values and factors."""
+    settings = [Setting(each.parameter, factor, factor=True) for each, factor in zip(tolerances, row, strict=True)]
+    return {**nominal, **apply_settings(parameters, settings, nominal)}
 
 
 def robustness(  # noqa: PLR0913 - the study, and how it is run
     work: Callable[[dict[str, float]], dict[str, Any]],
-    nominal: Mapping[str, float],
+    parameters: Sequence[Parameter],
     tolerances: Sequence[Tolerance],
     *,
+    nominal: Mapping[str, float] | None = None,
     events: Mapping[str, Callable[[Mapping[str, Any]], bool]],
     measures: Sequence[str],
     about: str = "",
@@ -138,26 +135,29 @@ def robustness(  # noqa: PLR0913 - the study, and how it is run
     workers: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Robustness:
-    """Probabilities of events, and what they depend on.
+    """Probabilities of events, and Sobol' indices of measures.
 
     Parameters
     ----------
     work : callable
-        From parameters to a dictionary of numbers and words; it must go through pickle where processes do not fork.
-    nominal : mapping of str to float
-        Parameters by name.
+        From all parameters by name to a dictionary of numbers and texts; as of `run_many`.
+    parameters : sequence of Parameter
+        Of the model.
     tolerances : sequence of Tolerance
         How they spread.
+    nominal : mapping of str to float or None
+        Nominal values that differ from the model's.
     events : mapping of str to callable
         Whether something has happened, from a result.
     measures : sequence of str
-        Keys of the numbers in a result whose variance is traced back.
+        Keys of the numbers in a result whose variance is analyzed.
     about : str
-        All that results depend on besides the parameters: those kept under another one are not used.
+        A text with all that results depend on besides the parameters; those cached under another one are not used.
     base : int
-        Points of one block, a power of two; tolerances + 2 blocks are run, 2 base points give the probabilities.
+        Sobol' base sample size, a power of two; tolerances + 2 blocks of that size are run, two of them give the
+        probabilities.
     seed : int
-        Of the random points.
+        Random seed.
     done, workers, progress
         As for `run_many`.
 
@@ -165,18 +165,19 @@ def robustness(  # noqa: PLR0913 - the study, and how it is run
     ------
     MissingLibrary
         Without SALib.
-    ValueError
-        Without tolerances, or with a base that is no power of two.
+    StudyError
+        Without tolerances, or with a base that is not a power of two.
     """
     if not tolerances:
-        raise ValueError("robustness needs at least one tolerance: add [[tolerances]] to the specification")
+        raise StudyError("robustness needs at least one tolerance: add [[tolerances]] to the specification")
     if base < 2 or base & (base - 1):  # noqa: PLR2004 - Sobol' points fill the space in powers of two
-        raise ValueError(f"robustness: base must be a power of two, got {base}")
+        raise StudyError(f"robustness: base must be a power of two, got {base}")
     names = [tolerance.parameter for tolerance in tolerances]
     sample, influences_of = _scheme(names, seed)
     rows = factors(sample(base), tolerances)
-    sets = [{**nominal, **spread(nominal, tolerances, row.tolist())} for row in rows]
-    keys = [fingerprint([about, values]) for values in sets]
+    values = {each.name: float(each.default) for each in parameters} | dict(nominal or {})
+    sets = [spread(parameters, values, tolerances, row.tolist()) for row in rows]
+    keys = [fingerprint(about, each) for each in sets]
     found = run_many(work, dict(zip(keys, sets, strict=True)), done=done, workers=workers, progress=progress)
     results = [found[key] for key in keys]
     block = len(names) + 2
@@ -196,13 +197,13 @@ def robustness(  # noqa: PLR0913 - the study, and how it is run
 def _scheme(
     names: Sequence[str], seed: int
 ) -> tuple[Callable[[int], np.ndarray], Callable[[np.ndarray], tuple[Influence, ...]]]:
-    """Saltelli's: shares between 0 and 1 from the points of a block, and influences from a measure at all points."""
+    """Saltelli's scheme: quantiles from a base sample size, and indices from a measure at all points."""
     try:
         from SALib.analyze import sobol as analysis
         from SALib.sample import sobol as sampling
     except ImportError:
         raise MissingLibrary(
-            "robustness needs SALib for its sensitivities; install it with: pip install 'geared-actuator[robustness]'"
+            "robustness needs SALib for its indices; install it with: pip install 'geared-actuator[robustness]'"
         ) from None
     problem = {"num_vars": len(names), "names": list(names), "bounds": [[0.0, 1.0]] * len(names)}
     sample = partial(sampling.sample, problem, calc_second_order=False, scramble=True, seed=seed)
@@ -211,7 +212,7 @@ def _scheme(
 
 
 def _influences(names: Sequence[str], analyze: Callable[..., Any], values: np.ndarray) -> tuple[Influence, ...]:
-    """Sobol' indices; all zero where nothing varies."""
+    """Sobol' indices, all zero where nothing varies; the largest total first."""
     if np.ptp(values) <= 1e-12 * abs(values).max(initial=0.0):
         return tuple(Influence(name, 0.0, 0.0, 0.0, 0.0) for name in names)
     found = analyze(values)

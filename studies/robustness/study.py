@@ -1,10 +1,10 @@
-"""The robustness of a case in production: hunting and bandwidth over the tolerances of its specification, as files."""
+"""Robustness of a case in production: hunting and bandwidth over the tolerances of its specification, as files."""
 
 import csv
 import io
 import math
-from collections.abc import Callable, Mapping, MutableMapping
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,25 +14,27 @@ from matplotlib.figure import Figure
 
 from actuator.actuator import Actuator
 from actuator.verdict.verdict import REST
-from studies.cache import actuator_of
+from studies.cache import fingerprint
 from studies.cases import Case
-from studies.files import CaseError
-from studies.findings import Findings, rendered, versions
+from studies.corners import AS_IS, Corner, select
+from studies.files import StudyError
+from studies.findings import Findings, render, versions
 from studies.robustness.robustness import CONFIDENCE, Probability, Robustness, robustness
-from studies.specification import Corner, Demand, Specification, matching
+from studies.specification import Demand, Specification
+from studies.study import Work
 from studies.tuning.check import SINE, STEP, Bench, Trial
 from studies.tuning.plant import dead_banded, defaults_of
-from studies.tuning.tuned_gains import tuned_gains
+from studies.tuning.result import read_tuned_gains
 
 STEPS = (0.1, 1.0)  # of the demanded amplitude
 SHOWN = 12  # parameters in the picture
 HUNTS, SLOW = "hunting or undecided", "missing the bandwidth"
 CYCLE, FOLLOWED = "cycle", "followed"
-WORDS = {CYCLE: "the amplitude of the cycle", FOLLOWED: "load over reference"}
+LABELS = {CYCLE: "the amplitude of the cycle", FOLLOWED: "load over reference"}
 
 
-class Shot:
-    """One actuator of a production: does it hunt, and does it follow.
+class Trials:
+    """Simulations of one actuator of a production: does it hunt, and does it follow.
 
     Parameters
     ----------
@@ -57,121 +59,133 @@ class Shot:
 
 
 def hunts(result: Mapping[str, Any]) -> bool:
-    """Whether a step does not come to rest: it hunts, or its run is irregular or failed."""
+    """Whether a step does not come to rest: it hunts, or its run is irregular, undecided or failed."""
     return any(verdict != REST for verdict in result["verdicts"])
 
 
-def slow(result: Mapping[str, Any]) -> bool:
+def is_slow(result: Mapping[str, Any]) -> bool:
     """Whether the load falls short of the reference by more than 3 dB."""
     return not result[FOLLOWED] >= 1 / math.sqrt(2)
 
 
-def corner_named(specification: Specification, plant: Actuator, words: str) -> Corner:
-    """The first corner whose name has these words; the first of all for none.
-
-    Raises
-    ------
-    CaseError
-        Where there is none.
-    """
+def find_corner_named(specification: Specification, plant: Actuator, part: str) -> Corner:
+    """The first corner whose name contains a text; StudyError where there is none."""
     corners = specification.all_corners(plant)
     for corner in corners:
-        if words in corner.name:
+        if part in corner.name:
             return corner
-    raise CaseError(f"no corner has {words!r} in its name; there are {'; '.join(corner.name for corner in corners)}")
+    raise StudyError(f"no corner name contains {part!r}; they are {'; '.join(corner.name for corner in corners)}")
 
 
-def robustness_study(  # noqa: PLR0913 - the study, and how it is run
-    specification: Specification,
-    case: Case,
-    *,
-    gains: Path | None = None,
-    corner: str = "",
-    base: int = 32,
-    seed: int = 1,
-    done: MutableMapping[str, dict[str, Any]] | None = None,
-    workers: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
-) -> Findings:
-    """Monte Carlo over the tolerances of a specification, for the case as it is or with the gains of a tuning."""
-    plant = dead_banded(case.actuator)
-    where = corner_named(specification, case.actuator, corner)
-    tuned = tuned_gains(gains, plant) if gains else None
-    own = tuned.values if tuned else {}
-    nominal = defaults_of(plant.system().parameters) | where.parameters | own
-    for tolerance in specification.tolerances:
-        if not any(nominal[name] for name in matching(tolerance.parameter, nominal)):
-            raise CaseError(f"tolerances: {tolerance.parameter} is zero, which no factor changes")
-    found = robustness(
-        Shot(plant, specification.demand),
-        nominal,
-        specification.tolerances,
-        events={HUNTS: hunts, SLOW: slow},
-        measures=(CYCLE, FOLLOWED),
-        about=repr((plant, specification.demand)),
-        base=base,
-        seed=seed,
-        done=done,
-        workers=workers,
-        progress=progress,
-    )
-    about = f"{case.name}, {tuned.words if tuned else 'as it is'}, {where.name}"
-    pictures = {"influences": _influences(found), "scatter": _scatter(found)}
-    text = sentences(found, about)
-    result = {
-        "about": about,
-        "title": specification.title,
-        "model": actuator_of(plant, nominal),
-        "seed": seed,
-        "base": base,
-        "tolerances": [
-            {"parameter": each.parameter, "spread": each.spread, "size": each.size} for each in specification.tolerances
-        ],
-        "probabilities": {name: {**each._asdict(), "value": each.value} for name, each in found.probabilities.items()},
-        "influences": {name: [row._asdict() for row in rows] for name, rows in found.influences.items()},
-        "parameters": {p.name: {"value": nominal[p.name], "unit": p.unit} for p in replace(plant).system().parameters},
-        "versions": versions("SALib"),
-    }
-    return Findings(
-        pictures=pictures,
-        result=result,
-        text=text,
-        files={"points.csv": _points_csv(found)},
-        page=partial(_html, result, text),
-    )
+@dataclass(frozen=True, kw_only=True)
+class RobustnessStudy:
+    """Monte Carlo over the tolerances of a specification, for a case as it is or with the gains of a tuning.
+
+    Parameters
+    ----------
+    specification : Specification
+        Tolerances, demands and corners.
+    case : Case
+        The nominal actuator.
+    gains : Path or None
+        The result.json of a tuning, for its gains.
+    corner : str
+        Part of the name of the corner.
+    base, seed : int
+        As of `robustness`.
+    """
+
+    specification: Specification
+    case: Case
+    gains: Path | None = None
+    corner: str = ""
+    base: int = 32
+    seed: int = 1
+    title: str = "Actuators"
+
+    def run(self, work: Work) -> Findings:
+        """Run the sample and write the report."""
+        specification, case, tolerances = self.specification, self.case, self.specification.tolerances
+        plant = dead_banded(case.actuator)
+        parameters = plant.system().parameters
+        where = find_corner_named(specification, case.actuator, self.corner)
+        tuned = read_tuned_gains(self.gains, plant) if self.gains else None
+        nominal = defaults_of(parameters) | where.parameters | (tuned.values if tuned else {})
+        for tolerance in tolerances:
+            if not any(nominal[name] for name in select(parameters, tolerance.parameter, factor=True).parameters):
+                raise StudyError(f"tolerances: {tolerance.parameter} is zero, which no factor changes")
+        found = robustness(
+            Trials(plant, specification.demand),
+            parameters,
+            tolerances,
+            nominal=nominal,
+            events={HUNTS: hunts, SLOW: is_slow},
+            measures=(CYCLE, FOLLOWED),
+            about=repr((plant, specification.demand)),
+            base=self.base,
+            seed=self.seed,
+            done=work.cache,
+            workers=work.jobs,
+            progress=work.part(0.0, 1.0),
+        )
+        about = f"{case.name}, {tuned.label if tuned else AS_IS}, {where.name}"
+        text = sentences(found, about)
+        result = {
+            "about": about,
+            "title": specification.title,
+            "model": fingerprint(plant, nominal),
+            "seed": self.seed,
+            "base": self.base,
+            "tolerances": [asdict(each) for each in tolerances],
+            "probabilities": {
+                name: {**each._asdict(), "value": each.value} for name, each in found.probabilities.items()
+            },
+            "influences": {name: [row._asdict() for row in rows] for name, rows in found.influences.items()},
+            "parameters": {each.name: {"value": nominal[each.name], "unit": each.unit} for each in parameters},
+            "versions": versions("SALib"),
+        }
+        return Findings(
+            pictures={"influences": _influences(found), "scatter": _scatter(found)},
+            result=result,
+            text=text,
+            files={"points.csv": _points_csv(found)},
+            page=partial(_html, result, text),
+        )
 
 
 def sentences(found: Robustness, about: str) -> list[str]:
-    """What came of it."""
-    text = [about, *(f"probability of {name}: {in_words(each)}" for name, each in found.probabilities.items())]
+    """The findings in sentences."""
+    text = [about, *(f"probability of {name}: {describe(each)}" for name, each in found.probabilities.items())]
     for measure, rows in found.influences.items():
         if rows[0].total > 0:
             listed = ", ".join(f"{row.parameter} {row.total:.2f} +- {row.total_within:.2f}" for row in rows[:3])
-            text.append(f"what {WORDS[measure]} depends on most (share of its variance): {listed}")
+            text.append(f"{LABELS[measure]} depends most on (share of its variance): {listed}")
         else:
-            text.append(f"{WORDS[measure]} does not vary")
+            text.append(f"{LABELS[measure]} does not vary")
     return text
 
 
-def in_words(each: Probability) -> str:
+def describe(each: Probability) -> str:
     """A probability with its interval."""
     return (
-        f"{each.value:.3g} ({each.happened} of {each.trials}; between {each.low:.3g} and {each.high:.3g} "
-        f"with {CONFIDENCE:.0%} confidence)"
+        f"{each.value:.3g} ({each.happened} of {each.trials}; {CONFIDENCE:.0%} confidence interval {each.low:.3g} to "
+        f"{each.high:.3g})"
     )
 
 
 def _influences(found: Robustness) -> Figure:
-    """Total and own share of the variance, a bar per parameter."""
+    """Total and first-order indices, a bar per parameter."""
     figure = Figure(figsize=(9, 3.8), layout="constrained")
     panels = figure.subplots(1, len(found.influences), squeeze=False)[0]
     for axes, (measure, rows) in zip(panels, found.influences.items(), strict=True):
         shown = rows[:SHOWN][::-1]
         at = np.arange(len(shown))
         axes.barh(at + 0.2, [row.total for row in shown], 0.4, xerr=[row.total_within for row in shown], label="total")
-        axes.barh(at - 0.2, [row.alone for row in shown], 0.4, xerr=[row.alone_within for row in shown], label="alone")
+        axes.barh(
+            at - 0.2, [row.alone for row in shown], 0.4, xerr=[row.alone_within for row in shown], label="first order"
+        )
         axes.set_yticks(at, [row.parameter for row in shown], fontsize="small")
-        axes.set_xlabel(f"share of the variance of\n{WORDS[measure]}")
+        axes.set_xlabel(f"share of the variance of\n{LABELS[measure]}")
         most = max(row.total + row.total_within for row in rows)
         axes.set_xlim(0, max(1.25, 1.05 * most))
         axes.grid(alpha=0.3, axis="x")
@@ -182,13 +196,13 @@ def _influences(found: Robustness) -> Figure:
 
 
 def _scatter(found: Robustness) -> Figure:
-    """Every actuator: over the two parameters that matter most for the bandwidth, those that hunt marked."""
+    """Every actuator over the two parameters with the largest indices, those that hunt marked."""
     rows = max(found.influences.values(), key=lambda rows: rows[0].total)
     names = [row.parameter for row in rows[:2]]
     names = names if len(names) == 2 else names * 2  # noqa: PLR2004 - two axes
     figure = Figure(figsize=(6, 4.2), layout="constrained")
     axes = figure.subplots()
-    for label, marks, style in (("rests", False, "o"), ("hunts or undecided", True, "x")):
+    for label, marks, style in (("at rest", False, "o"), (HUNTS, True, "x")):
         chosen = [p for p, result in zip(found.points, found.results, strict=True) if hunts(result) == marks]
         if chosen:
             axes.plot([p[names[0]] for p in chosen], [p[names[1]] for p in chosen], style, ms=5, label=label)
@@ -210,7 +224,7 @@ def _points_csv(found: Robustness) -> str:
 
 
 def _html(result: dict[str, Any], text: list[str], pictures: Mapping[str, str]) -> str:
-    return rendered(
+    return render(
         "robustness.html",
         result=result,
         text=text,

@@ -1,4 +1,4 @@
-"""A design held against its demands by simulation, in every corner: does it hunt, does it follow, what does it draw."""
+"""A design checked against its demands by simulation in every corner: hunting, following, current and torque."""
 
 import math
 from collections.abc import Callable, Mapping, MutableMapping, Sequence
@@ -14,18 +14,18 @@ from actuator.simulation.many import run_many
 from actuator.simulation.run import Run
 from actuator.simulation.signals import Step
 from actuator.simulation.simulate import simulate
-from actuator.stiction.margins import SLIDING, at_least_sliding
 from actuator.stiction.standstill import rest_of
-from actuator.verdict.verdict import FAILED, REST, Hunting, classify, decide
+from actuator.system.parameters import Parameter, scaled_breakaway
+from actuator.verdict.verdict import FAILED, REST, Hunting, Verdict, classify, decide
 from studies.cache import fingerprint
-from studies.specification import Corner, Demand
-from studies.tuning.plant import defaults_of
+from studies.corners import Corner
+from studies.specification import Demand
 
 STEPS = (0.1, 1.0, 10.0)  # of the demanded amplitude: a small move, the move itself, a large one
-BEFORE, DURATION = 0.05, 10.0  # s, when the step comes and how long is looked at first
+BEFORE, DURATION = 0.05, 10.0  # s, time of the step and first duration
 RESOLUTION = 2.5e-3  # s
-LONGEST = 6.0  # times the duration, for runs that do not decide
-STEP, SINE = "step", "sine"
+LONGEST = 6.0  # times the duration, for runs without a verdict
+STEP, SINE = "step", "sine"  # kinds of trials
 
 
 class Trial(NamedTuple):
@@ -37,32 +37,44 @@ class Trial(NamedTuple):
     frequency: float = 0.0
 
 
+class StepCase(NamedTuple):
+    """A step by its size over the demanded amplitude, and the factor on breakaway friction."""
+
+    size: float
+    breakaway: float
+
+    @property
+    def label(self) -> str:
+        """As of tables."""
+        return f"x{self.size:g}, {self.breakaway:.4g} breakaway"
+
+
 @dataclass(frozen=True, kw_only=True)
 class CornerCheck:
-    """What the simulations of one corner show.
+    """Results of the simulations of one corner.
 
     Attributes
     ----------
     corner : str
         Its name.
-    verdicts : dict of str to str
-        By step size over the demanded amplitude and factor on breakaway friction, "x0.1, 1.3 breakaway".
+    verdicts : dict of StepCase to Verdict
+        Of every step.
     cycle : float
-        Largest amplitude of a cycle at the factor 1 [rad]; zero where nothing hunts.
+        Largest amplitude of a cycle at the factor 1 [rad]; zero without a cycle.
     standing_error : float
-        Largest error at rest [rad], of those runs that rest.
+        Largest error at rest [rad], of the runs that come to rest.
     followed : float
         Load angle over reference at the demanded bandwidth and amplitude [-]; zero where the simulation failed.
     settled : bool
         Whether that sine has settled.
     overshoot : float
-        Of the step of the demanded amplitude, over the way from where the load was at rest [-].
+        Of the step of the demanded amplitude, over the travel from where the load was at rest [-].
     peak_current, peak_torque : float
-        Of the motor in the step of the demanded amplitude, once it has begun [A], [N m]; nan where there is no current.
+        Of the motor from the step of the demanded amplitude on [A], [N m]; nan where there is no current.
     """
 
     corner: str
-    verdicts: dict[str, str]
+    verdicts: dict[StepCase, Verdict]
     cycle: float
     standing_error: float
     followed: float
@@ -73,11 +85,7 @@ class CornerCheck:
 
     def hunts(self, factor: float) -> bool:
         """Whether a run with this factor on breakaway friction does not come to rest."""
-        return any(verdict != REST for name, verdict in self.verdicts.items() if name.endswith(_label(factor)))
-
-
-def _label(factor: float) -> str:
-    return f"{factor:.4g} breakaway"
+        return any(verdict != REST for case, verdict in self.verdicts.items() if case.breakaway == factor)
 
 
 class Bench:
@@ -86,7 +94,7 @@ class Bench:
     Parameters
     ----------
     plant : Actuator
-        What is tried.
+        What is simulated.
     """
 
     def __init__(self, plant: Actuator) -> None:
@@ -133,25 +141,13 @@ class Bench:
 
 
 def step_trials(
-    corner: Corner, design: Mapping[str, float], demand: Demand, defaults: Mapping[str, float], factor: float
-) -> dict[str, Trial]:
-    """Steps of all sizes in a corner, with a factor on breakaway friction; that is never below sliding friction."""
-    parameters = corner.parameters | dict(design)
-    values = dict(defaults) | parameters
-    names = [name for name in values if name.endswith(tuple(SLIDING))]
-    sticky = {name: at_least_sliding(name, factor * values[name], values) for name in names}
-    return {f"x{part:g}, {_label(factor)}": Trial(STEP, parameters | sticky, part * demand.sine) for part in STEPS}
-
-
-def trials(
-    corner: Corner, design: Mapping[str, float], demand: Demand, defaults: Mapping[str, float]
-) -> dict[str, Trial]:
-    """What is simulated in a corner, by what it is called."""
-    found = {}
-    for factor in dict.fromkeys((1.0, demand.stiction_margin)):
-        found |= step_trials(corner, design, demand, defaults, factor)
-    found[SINE] = Trial(SINE, corner.parameters | dict(design), demand.sine, demand.bandwidth)
-    return found
+    corner: Corner, design: Mapping[str, float], demand: Demand, parameters: Sequence[Parameter], factor: float
+) -> dict[StepCase, Trial]:
+    """Steps of all sizes in a corner, with a factor on breakaway friction, which does not fall below sliding."""
+    changed = corner.parameters | dict(design)
+    values = {parameter.name: float(parameter.default) for parameter in parameters} | changed
+    sticky = scaled_breakaway(parameters, factor, values)
+    return {StepCase(size, factor): Trial(STEP, changed | sticky, size * demand.sine) for size in STEPS}
 
 
 def check_corners(  # noqa: PLR0913 - what is checked, and how it is run
@@ -164,7 +160,7 @@ def check_corners(  # noqa: PLR0913 - what is checked, and how it is run
     workers: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[CornerCheck]:
-    """Simulate a design in every corner.
+    """Simulate a design in every corner: steps with breakaway friction as it is and with its margin, and a sine.
 
     Parameters
     ----------
@@ -179,29 +175,37 @@ def check_corners(  # noqa: PLR0913 - what is checked, and how it is run
     done, workers, progress
         As for `run_many`.
     """
-    defaults, model = defaults_of(plant.system().parameters), repr(plant)
-    wanted = {corner.name: trials(corner, design, demand, defaults) for corner in corners}
-    keys = {
-        (corner, name): fingerprint([model, *trial])
-        for corner, named in wanted.items()
-        for name, trial in named.items()
-    }
-    points = {keys[corner, name]: trial for corner, named in wanted.items() for name, trial in named.items()}
+    parameters, model = plant.system().parameters, fingerprint(plant)
+    factors = tuple(dict.fromkeys((1.0, demand.stiction_margin)))
+    trials: dict[tuple[str, StepCase | None], Trial] = {}
+    for corner in corners:
+        for factor in factors:
+            steps = step_trials(corner, design, demand, parameters, factor)
+            trials |= {(corner.name, case): trial for case, trial in steps.items()}
+        sine = Trial(SINE, corner.parameters | dict(design), demand.sine, demand.bandwidth)
+        trials[corner.name, None] = sine
+    keys = {place: fingerprint(model, trial) for place, trial in trials.items()}
+    points = {keys[place]: trial for place, trial in trials.items()}
     results = run_many(Bench(plant), points, done=done, workers=workers, progress=progress)
-    return [_summed(corner, {name: results[keys[corner, name]] for name in named}) for corner, named in wanted.items()]
+    return [
+        _check_corner(
+            corner.name,
+            {case: results[keys[name, case]] for name, case in trials if name == corner.name and case is not None},
+            results[keys[corner.name, None]],
+        )
+        for corner in corners
+    ]
 
 
-def _summed(corner: str, found: Mapping[str, dict[str, Any]]) -> CornerCheck:
-    steps = {name: result for name, result in found.items() if name != SINE}
-    plain = [result for name, result in steps.items() if name.endswith(_label(1.0))]
-    own = steps[f"x1, {_label(1.0)}"]
+def _check_corner(corner: str, steps: Mapping[StepCase, dict[str, Any]], sine: Mapping[str, Any]) -> CornerCheck:
+    own = steps[StepCase(1.0, 1.0)]
     return CornerCheck(
         corner=corner,
-        verdicts={name: result["verdict"] for name, result in steps.items()},
-        cycle=max(result.get("amplitude", 0.0) for result in plain),
+        verdicts={case: Verdict(result["verdict"]) for case, result in steps.items()},
+        cycle=max(result.get("amplitude", 0.0) for case, result in steps.items() if case.breakaway == 1.0),
         standing_error=max(result.get("error", 0.0) for result in steps.values()),
-        followed=found[SINE]["followed"],
-        settled=found[SINE]["settled"],
+        followed=sine["followed"],
+        settled=sine["settled"],
         overshoot=own.get("overshoot", math.nan),
         peak_current=own.get("peak_current", math.nan),
         peak_torque=own.get("peak_torque", math.nan),

@@ -12,11 +12,11 @@ from actuator.stiction.standstill import rest_of
 from studies.tuning.check import BEFORE
 from studies.tuning.loops import curves_at
 from studies.tuning.measures import worst
-from studies.tuning.modes import corner_modes, moved
+from studies.tuning.modes import corner_modes, move_point
 from studies.tuning.plant import for_linear_models, loops_of
+from studies.tuning.result import Tuned
 from studies.tuning.stiction import MOST
 from studies.tuning.stiction import STEP as RUNG
-from studies.tuning.study import Tuned
 
 VIEW, HOLD = 1.0, 12.0  # s of the step that are shown, and of the hold behind it
 RED, GREEN = "#c0392b", "#2e8b57"
@@ -70,7 +70,7 @@ def loops_picture(tuned: Tuned) -> Figure:
         modes = corner_modes(linear, names[corner], 1.0, tuned.before)
         for mode in ("forward", "backward"):
             for label, gains, color in (("before", tuned.before, RED), ("tuned", tuned.design.gains, GREEN)):
-                curves = curves_at(moved(modes.points[mode], gains), gains)
+                curves = curves_at(move_point(modes.points[mode], gains), gains)
                 for column, at in enumerate(opened):
                     hertz, loop = curves.frequencies(at) / (2 * math.pi), curves.loop(at)
                     draw_bode(panels[0, column], panels[1, column], hertz, loop, color=color, linewidth=1, label=label)

@@ -13,20 +13,21 @@ from actuator.system.parameters import Parameter, with_values
 from controllers.controller import Controller, integrating_law, prefix_of_integral
 from controllers.countermeasures import with_integral
 from controllers.integral import IntegralRemedies
-from studies.specification import Demand
+from studies.files import StudyError
+from studies.specification import Criterion, Demand
 
 OWNER = "controller."  # of the gains, in the names of parameters
 ROOM = 1.5  # bandwidth of the position loop at the start, over the demanded one
 
 
-class NotTunable(ValueError):
+class NotTunable(StudyError):
     """No gains meet the demands, or the actuator is not one that can be tuned here."""
 
 
 class Effort(NamedTuple):
-    """What a demand bounds in a step: a measure, the output it is of, the limit and its unit."""
+    """A bound on an output in a step: the criterion, the output, the limit and its unit."""
 
-    name: str
+    criterion: Criterion
     output: str
     limit: float
     unit: str
@@ -72,9 +73,9 @@ def efforts_of(demand: Demand, system: HybridSystem) -> list[Effort]:
     if demand.peak_current is not None:
         if "current" not in [quantity.name for quantity in system.outputs]:
             raise NotTunable(f"{system.name}: its motor has no current; demand a peak_torque instead of a peak_current")
-        found.append(Effort("peak current", "current", demand.peak_current, "A"))
+        found.append(Effort(Criterion.PEAK_CURRENT, "current", demand.peak_current, "A"))
     if demand.peak_torque is not None:
-        found.append(Effort("peak torque", "motor_torque", demand.peak_torque, "N m"))
+        found.append(Effort(Criterion.PEAK_TORQUE, "motor_torque", demand.peak_torque, "N m"))
     return found
 
 

@@ -1,4 +1,4 @@
-"""A tuning as files: pictures, result.json, tables as CSV, and report.html with everything inside."""
+"""A tuning as files: pictures, result.json, tables as CSV, and report.html with the pictures inside."""
 
 import csv
 import io
@@ -9,18 +9,20 @@ from functools import partial
 from typing import Any
 
 from actuator.verdict.verdict import REST
-from studies.cache import actuator_of
+from gear.quantities.roles import InLoop
+from studies.cache import fingerprint
 from studies.cases import Case
-from studies.findings import Findings, rendered, versions
+from studies.findings import Findings, render, versions
+from studies.specification import Criterion
 from studies.tuning.check import CornerCheck
+from studies.tuning.design import Active
 from studies.tuning.measures import Measure, worst
 from studies.tuning.pictures import loops_picture, margins_picture, steps_picture, trade_off_picture
 from studies.tuning.plant import dead_band_of
+from studies.tuning.result import Tuned
 from studies.tuning.stiction import ACCURACY, MOST, STEP, StictionMargin, least_margin
-from studies.tuning.study import Tuned
 
 SHOWN = {"rad": (180 / math.pi, "deg"), "s": (1e3, "ms")}
-BELOW = ("peak current", "peak torque", "overshoot", "slip")  # demanded to be at most
 
 
 def tuning_findings(tuned: Tuned, case: Case) -> Findings:
@@ -42,7 +44,7 @@ def tuning_findings(tuned: Tuned, case: Case) -> Findings:
 
 
 def sentences(tuned: Tuned) -> list[str]:
-    """What came of it."""
+    """The findings in sentences."""
     demand, last = tuned.specification.demand, tuned.rounds[-1]
     factor = demand.stiction_margin
     count = len(tuned.corners)
@@ -52,37 +54,38 @@ def sentences(tuned: Tuned) -> list[str]:
     )
     slow, still_slow = (min(check.followed for check in checks) for checks in (tuned.before_checks, last.checks))
     unsettled = [
-        f"{when} at {check.corner}"
+        f"{when} tuning at {check.corner}"
         for when, checks in (("before", tuned.before_checks), ("after", last.checks))
         for check in checks
         if not check.settled
     ]
     gains = ", ".join(f"{name} {tuned.before[name]:.4g} -> {value:.4g}" for name, value in tuned.design.gains.items())
     dead = dead_band_of(tuned.original)
-    unit = "rad/s of the motor" if ".speed." in dead else "rad"
+    (loop,) = [each.role(InLoop) for each in tuned.plant.system().parameters if each.name == dead]
+    unit = "rad/s of the motor" if loop and loop.loop == "speed" else "rad"
     return [
-        f"gains: {gains}; dead band of the integral {tuned.parameters[dead]:.4g} {unit}, which lets the load rest up "
-        f"to {math.degrees(tuned.design.standing_error):.3g} deg from its reference",
-        f"hunting or undecided, simulated with breakaway friction up to {factor:g} times: in {hunting} of {count} "
-        f"corners before, in {now} after",
-        "the steps begin to hunt or not to decide, with one factor on all breakaway friction, "
-        f"{_begins(tuned.margins_before)} before, {_begins(tuned.margins)} after; tried from the lowest factor in "
-        f"steps of {100 * (STEP - 1):.0f} % (hunting in a narrower window can be missed), then by bisection to "
-        f"{100 * (ACCURACY - 1):.0f} %",
+        f"gains: {gains}; dead band of the integral {tuned.parameters[dead]:.4g} {unit}, which allows a standing error "
+        f"of {math.degrees(tuned.design.standing_error):.3g} deg at the load",
+        f"corners that hunt or are undecided in simulations with up to {factor:g} times the breakaway friction: "
+        f"{hunting} of {count} before tuning, {now} after",
+        "hunting (or an undecided step) begins, with one factor on all breakaway friction, "
+        f"{_describe_margin(tuned.margins_before)} before tuning, {_describe_margin(tuned.margins)} after; factors are "
+        f"tried upward from the lowest in steps of {100 * (STEP - 1):.0f} % (hunting in a narrower window can be "
+        f"missed), then bisected to {100 * (ACCURACY - 1):.0f} %",
         f"load over reference at {demand.bandwidth:g} Hz and {math.degrees(demand.sine):.3g} deg, in the worst corner: "
-        f"{slow:.3f} before, {still_slow:.3f} after ({1 / math.sqrt(2):.3f} demanded)",
-        *([f"of these sines have failed or not settled: {'; '.join(unsettled)}"] if unsettled else []),
+        f"{slow:.3f} before tuning, {still_slow:.3f} after ({1 / math.sqrt(2):.3f} demanded)",
+        *([f"sines that failed or did not settle: {'; '.join(unsettled)}"] if unsettled else []),
         *(
-            f"{each.name}{f' ({each.corner}, {each.mode})' if each.mode else ''} decides: {each.cost}"
+            f"{each.name}{f' ({each.corner}, {each.mode})' if each.mode else ''} is active: {each.cost}"
             for each in tuned.design.active
-            if each.name != "slip"
+            if each.criterion is not Criterion.SLIP
         ),
     ]
 
 
-def _begins(found: Sequence[StictionMargin]) -> str:
+def _describe_margin(found: Sequence[StictionMargin]) -> str:
     least = least_margin(found)
-    return f"in no corner up to factor {MOST:g}" if least.hunts is None else f"{least.words} ({least.corner})"
+    return f"in no corner up to factor {MOST:g}" if least.hunts is None else f"{least.label} ({least.corner})"
 
 
 def result_of(tuned: Tuned, case: Case) -> dict[str, Any]:
@@ -91,20 +94,20 @@ def result_of(tuned: Tuned, case: Case) -> dict[str, Any]:
     return {
         "case": case.name,
         "title": tuned.specification.title,
-        "model": actuator_of(tuned.plant),
+        "model": fingerprint(tuned.plant),
         "met": tuned.met,
         "demand": asdict(tuned.specification.demand),
         "gains": {"before": tuned.before, "start": tuned.start, "tuned": tuned.parameters},
         "standing_error": tuned.design.standing_error,
-        "active": [{**each._asdict(), "cost": each.cost} for each in tuned.design.active],
+        "active": [_without(each, "criterion") | {"cost": each.cost} for each in tuned.design.active],
         "rounds": [{"tightening": each.tightening, "gains": each.design.gains} for each in tuned.rounds],
         "linear": {
-            when: {name: {k: v for k, v in m._asdict().items() if k != "slopes"} for name, m in worst(found).items()}
+            when: {name: _without(m, "criterion", "slopes") for name, m in worst(found).items()}
             for when, found in (("before", tuned.before_measures), ("tuned", tuned.design.measures))
         },
         "simulated": {
-            "before": [asdict(check) for check in tuned.before_checks],
-            "tuned": [asdict(check) for check in tuned.rounds[-1].checks],
+            "before": [_check_numbers(check) for check in tuned.before_checks],
+            "tuned": [_check_numbers(check) for check in tuned.rounds[-1].checks],
         },
         "stiction_margins": {
             when: [each._asdict() for each in found]
@@ -114,6 +117,14 @@ def result_of(tuned: Tuned, case: Case) -> dict[str, Any]:
         "parameters": parameters,
         "versions": versions(),
     }
+
+
+def _without(row: Measure | Active, *names: str) -> dict[str, Any]:
+    return {key: value for key, value in row._asdict().items() if key not in names}
+
+
+def _check_numbers(check: CornerCheck) -> dict[str, Any]:
+    return {**asdict(check), "verdicts": {case.label: verdict for case, verdict in check.verdicts.items()}}
 
 
 def _measures_csv(tuned: Tuned) -> str:
@@ -128,18 +139,20 @@ def _measures_csv(tuned: Tuned) -> str:
 def _corners_csv(tuned: Tuned) -> str:
     rows = io.StringIO()
     out = csv.writer(rows)
-    names = list(tuned.before_checks[0].verdicts)
+    cases = list(tuned.before_checks[0].verdicts)
     measured = ("cycle", "standing_error", "followed", "settled", "overshoot", "peak_current", "peak_torque")
     units = ("_rad", "_rad", "", "", "", "_A", "_Nm")
     heads = [name + unit for name, unit in zip(measured, units, strict=True)]
-    out.writerow(["design", "corner", *names, *heads, "rests_up_to_factor", "hunts_from_factor"])
+    out.writerow(
+        ["design", "corner", *(case.label for case in cases), *heads, "rests_up_to_factor", "hunts_from_factor"]
+    )
     designs = (
         ("before", tuned.before_checks, tuned.margins_before),
         ("tuned", tuned.rounds[-1].checks, tuned.margins),
     )
     for label, checks, margins in designs:
         for check, margin in zip(checks, margins, strict=True):
-            verdicts = [check.verdicts[name] for name in names]
+            verdicts = [check.verdicts[case] for case in cases]
             numbers = [getattr(check, name) for name in measured]
             out.writerow([label, check.corner, *verdicts, *numbers, margin.rests, margin.hunts])
     return rows.getvalue()
@@ -148,16 +161,16 @@ def _corners_csv(tuned: Tuned) -> str:
 def _html(tuned: Tuned, case: Case, result: dict[str, Any], text: list[str], pictures: Mapping[str, str]) -> str:
     before, after = worst(tuned.before_measures), worst(tuned.design.measures)
     factor = tuned.specification.demand.stiction_margin
-    return rendered(
+    return render(
         "tuning.html",
         tuned=tuned,
         case=case,
         result=result,
         text=text,
         pictures=pictures,
-        lines=[_line(before[name], after[name]) for name in after if name != "slip"],
+        lines=[_line(before[name], m) for name, m in after.items() if m.criterion is not Criterion.SLIP],
         corners=[
-            (a.corner, _simulated(a, factor, x), _simulated(b, factor, y))
+            (a.corner, _corner_cells(a, factor, x), _corner_cells(b, factor, y))
             for a, b, x, y in zip(
                 tuned.before_checks, tuned.rounds[-1].checks, tuned.margins_before, tuned.margins, strict=True
             )
@@ -172,11 +185,11 @@ def _html(tuned: Tuned, case: Case, result: dict[str, Any], text: list[str], pic
 
 def _line(before: Measure, after: Measure) -> dict[str, Any]:
     factor, unit = SHOWN.get(after.unit, (1.0, after.unit))
-    # a tightened limit is held against the model; the demand itself is shown
+    # the model has to meet the tightened limit; the demand itself is shown
     return {
         "name": after.name,
         "unit": "" if unit == "-" else unit,
-        "sign": "<=" if after.name in BELOW else ">=",
+        "sign": "<=" if after.criterion.upper else ">=",
         "limit": f"{before.limit * factor:.4g}",
         "before": _number(before.value * factor),
         "before_met": before.met,
@@ -190,7 +203,7 @@ def _number(value: float) -> str:
     return "none" if math.isinf(value) else f"{value:.4g}"
 
 
-def _simulated(check: CornerCheck, factor: float, margin: StictionMargin) -> dict[str, Any]:
+def _corner_cells(check: CornerCheck, factor: float, margin: StictionMargin) -> dict[str, Any]:
     bad = sorted({verdict for verdict in check.verdicts.values() if verdict != REST})
     return {
         "verdict": ", ".join(bad) or REST,

@@ -1,24 +1,26 @@
-"""The stiction margin that a design really has, simulated in every corner: in steps upward, then by bisection.
+"""The stiction margin of a design, by simulation in every corner: in steps upward, then by bisection.
 
-Hunting may end again where the motor is too weak to break away, so every factor from the lowest on is tried, in steps;
-hunting in a window of factors that is narrower than a step can be missed.
+Hunting may end again where the motor is too weak to break away, so factors are tried from the lowest upward, in steps;
+hunting in a window of factors narrower than a step can be missed.
 """
 
 import math
 from collections.abc import Callable, Mapping, MutableMapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 from actuator.actuator import Actuator
 from actuator.simulation.many import run_many
-from actuator.stiction.margins import sliding_of
+from actuator.stiction.margins import find_onset
+from actuator.system.parameters import Parameter, breakaway_floor
 from actuator.verdict.verdict import REST
 from studies.cache import fingerprint
-from studies.specification import Corner, Demand
+from studies.corners import Corner
+from studies.specification import Demand
 from studies.tuning.check import Bench, step_trials
-from studies.tuning.plant import defaults_of
 
-MOST = 4.0  # factor on all breakaway friction up to which hunting is looked for
-STEP = 1.25  # ratio of the factors that are tried on the way up
+MOST = 4.0  # largest factor on all breakaway friction
+STEP = 1.25  # ratio of successive factors on the way up
 ACCURACY = 1.05  # ratio of the factors between which hunting begins
 
 
@@ -41,12 +43,12 @@ class StictionMargin(NamedTuple):
     hunts: float | None
 
     @property
-    def words(self) -> str:
-        """What was found."""
+    def label(self) -> str:
+        """Where hunting begins, in words."""
         if self.hunts is None:
             return f"none up to factor {MOST:g}"
         if self.rests is None:
-            return "at the lowest factor too, with breakaway friction no more than sliding friction"
+            return "already at the lowest factor, where breakaway friction equals sliding friction"
         return f"between factors {self.rests:.3g} and {self.hunts:.3g}"
 
 
@@ -69,44 +71,36 @@ class Seeker:
 
     def __init__(self, plant: Actuator) -> None:
         self.bench = Bench(plant)
-        self.defaults = defaults_of(plant.system().parameters)
 
     def hunts(self, search: Search, factor: float) -> bool:
         """Whether a step does not come to rest; the largest is tried first, as it tells most often."""
-        steps = step_trials(search.corner, search.design, search.demand, self.defaults, factor)
+        parameters = self.bench.plant.system().parameters
+        steps = step_trials(search.corner, search.design, search.demand, parameters, factor)
         return any(self.bench(trial)["verdict"] != REST for trial in reversed(steps.values()))
+
+    def lowest(self, search: Search) -> float:
+        """The factor from which on is searched."""
+        return lowest_factor(self.bench.plant.system().parameters, search.corner.parameters)
 
     def __call__(self, search: Search) -> dict[str, Any]:
         """Factors between which hunting begins, from below; None where it does not on this side."""
-        low, *others = rungs(least(self.defaults | search.corner.parameters), search.demand.stiction_margin)
-        if self.hunts(search, low):
-            return {"rests": None, "hunts": low}
-        for high in others:
-            if self.hunts(search, high):
-                break
-            low = high
-        else:
-            return {"rests": low, "hunts": None}
-        while high > ACCURACY * low:
-            middle = math.sqrt(low * high)
-            low, high = (low, middle) if self.hunts(search, middle) else (middle, high)
-        return {"rests": low, "hunts": high}
+        factors = make_ladder(self.lowest(search), search.demand.stiction_margin)
+        if self.hunts(search, factors[0]):
+            return {"rests": None, "hunts": factors[0]}
+        return find_onset(partial(self.hunts, search), factors, tolerance=ACCURACY, first=False)._asdict()
 
 
-def rungs(lowest: float, demanded: float) -> list[float]:
-    """The factors that are tried, from the lowest to MOST: no further apart than STEP, with 1 and what is demanded."""
+def make_ladder(lowest: float, demanded: float) -> list[float]:
+    """Factors to try, from the lowest to MOST: no further apart than STEP, with 1 and the demanded one."""
     count = math.ceil(math.log(MOST / lowest) / math.log(STEP))
     return sorted({MOST, 1.0, demanded} | {lowest * STEP**k for k in range(count)})
 
 
-def least(values: Mapping[str, float]) -> float:
+def lowest_factor(parameters: Sequence[Parameter], changed: Mapping[str, float]) -> float:
     """The factor on breakaway friction at which none of it exceeds sliding friction."""
-    found = [1.0]
-    for name, value in values.items():
-        sliding = sliding_of(name, values)
-        if sliding is not None and value > 0:
-            found.append(values[sliding] / value)
-    return max(min(found), 1e-3)
+    values = {parameter.name: float(parameter.default) for parameter in parameters} | dict(changed)
+    floors = [(breakaway_floor(parameter, values), values[parameter.name]) for parameter in parameters]
+    return max(min([1.0, *(floor / value for floor, value in floors if floor is not None and value > 0)]), 1e-3)
 
 
 def stiction_margins(  # noqa: PLR0913 - what is searched, and how it is run
@@ -124,9 +118,9 @@ def stiction_margins(  # noqa: PLR0913 - what is searched, and how it is run
     Parameters as for `check_corners`.
     """
     searches = {corner.name: Search(corner, dict(design), demand) for corner in corners}
-    model, demanded = repr(plant), (demand.sine, demand.stiction_margin)
+    model, demanded = fingerprint(plant), (demand.sine, demand.stiction_margin)
     keys = {
-        name: fingerprint(["stiction", model, search.corner.parameters, search.design, *demanded, MOST, STEP, ACCURACY])
+        name: fingerprint("stiction", model, search.corner.parameters, search.design, demanded, MOST, STEP, ACCURACY)
         for name, search in searches.items()
     }
     points = {keys[name]: search for name, search in searches.items()}

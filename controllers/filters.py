@@ -19,7 +19,7 @@ from typing import Protocol
 
 import casadi as ca
 
-from controllers.memory import Memory
+from controllers.memory import LawWithMemory, Memory
 from controllers.units import DampingRatio, Frequency, ShareBelowOne
 from gear.quantities import Scalar, check, is_number
 from gear.quantities.registry import part
@@ -41,24 +41,8 @@ def half_step(frequency: Scalar, period: Scalar) -> Scalar:
     return ca.tan(frequency * period / 2) / frequency
 
 
-class Filter(Protocol):
-    """What shapes a signal in a loop: a slot for laws with memory (see `controllers.memory`)."""
-
-    def memory(self, unit: str = "signal", nominal: float = 1.0) -> tuple[Memory, ...]:
-        """What it remembers."""
-        ...
-
-    def output(self, memory: list[Scalar], signal: Scalar, period: Scalar | None = None) -> Scalar:
-        """Filtered signal."""
-        ...
-
-    def rates(self, memory: list[Scalar], signal: Scalar) -> list[Scalar]:
-        """Continuous form."""
-        ...
-
-    def advance(self, memory: list[Scalar], signal: Scalar, period: Scalar) -> list[Scalar]:
-        """Sampled form."""
-        ...
+class Filter(LawWithMemory, Protocol):
+    """What shapes a signal in a loop: memory of a unit and a usual size, one input."""
 
 
 @part(Filter)

@@ -8,7 +8,7 @@ from typing import Annotated, Protocol
 
 import casadi as ca
 
-from controllers.memory import Memory
+from controllers.memory import LawWithMemory, Memory
 from controllers.shapes import closing_rate
 from controllers.units import Frequency, Inertia, Time
 from gear.quantities import Scalar, check
@@ -63,24 +63,8 @@ class DisturbanceObserver:
         return [memory[0] - share * (self.output(memory, torque, speed, period) + torque)]
 
 
-class SpeedEstimator(Protocol):
-    """Speed of the motor from its measured angle: a slot for laws with memory (see `controllers.memory`)."""
-
-    def memory(self, unit: str = "rad", nominal: float = 1e-3) -> tuple[Memory, ...]:
-        """What it remembers."""
-        ...
-
-    def output(self, memory: list[Scalar], position: Scalar, period: Scalar | None = None) -> Scalar:
-        """Speed [rad/s]."""
-        ...
-
-    def rates(self, memory: list[Scalar], position: Scalar) -> list[Scalar]:
-        """Continuous form."""
-        ...
-
-    def advance(self, memory: list[Scalar], position: Scalar, period: Scalar) -> list[Scalar]:
-        """Sampled form."""
-        ...
+class SpeedEstimator(LawWithMemory, Protocol):
+    """Speed of the motor [rad/s] from its measured angle [rad]: memory of a unit and a usual size, one input."""
 
 
 @part(SpeedEstimator)

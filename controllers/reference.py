@@ -5,7 +5,7 @@ from typing import NamedTuple, Protocol
 
 import casadi as ca
 
-from controllers.memory import Memory
+from controllers.memory import LawWithMemory, Memory
 from controllers.shapes import saturate
 from controllers.units import SignalAcceleration, SignalRate, Time
 from gear.quantities import Scalar, check
@@ -22,27 +22,11 @@ class Motion(NamedTuple):
     acceleration: Scalar  # [signal/s^2]
 
 
-class ReferenceLimit(Protocol):
-    """A reference that a drive can follow: a slot for laws with memory (see `controllers.memory`)."""
-
-    def memory(self, unit: str = "signal", nominal: float = 1.0) -> tuple[Memory, ...]:
-        """What it remembers."""
-        ...
+class ReferenceLimit(LawWithMemory, Protocol):
+    """A reference that a drive can follow: memory of a unit and a usual size, one input."""
 
     def motion(self, memory: list[Scalar], signal: Scalar, period: Scalar | None = None) -> Motion:
         """Limited signal with its derivatives."""
-        ...
-
-    def output(self, memory: list[Scalar], signal: Scalar, period: Scalar | None = None) -> Scalar:
-        """Limited signal."""
-        ...
-
-    def rates(self, memory: list[Scalar], signal: Scalar) -> list[Scalar]:
-        """Continuous form."""
-        ...
-
-    def advance(self, memory: list[Scalar], signal: Scalar, period: Scalar) -> list[Scalar]:
-        """Sampled form."""
         ...
 
 

@@ -6,9 +6,8 @@ from typing import Any
 
 import casadi as ca
 
-from gear.quantities import Scalar, is_number
-
-GAINS = ("gain", "proportional", "integral", "derivative")
+from gear.quantities import Scalar, annotations, is_number
+from gear.quantities.roles import IntegralGain, LoopGain
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,8 +67,8 @@ class ScheduledGain:
         The copy is not checked again, as its gains may be expressions. The integral state is an output
         already, so a change of the factor does not step the integral part.
         """
-        scaled, factor = copy.copy(law), self.factor(value)
+        scaled, factor, notes = copy.copy(law), self.factor(value), annotations(law)
         for field in fields(law):
-            if field.name in GAINS:
+            if any(isinstance(note, LoopGain | IntegralGain) for note in notes[field.name]):
                 object.__setattr__(scaled, field.name, getattr(law, field.name) * factor)
         return scaled

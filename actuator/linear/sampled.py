@@ -14,19 +14,12 @@ from scipy.linalg import expm
 from actuator.actuator import Actuator
 from actuator.linear.jacobians import jacobians, require_smooth, tick_jacobians
 from actuator.linear.operating_point import OperatingPoint
-from actuator.parts.sensors import AngleSensor, CurrentSensor
 from gear.quantities import require_known
 
 
 def without_counts(actuator: Actuator) -> Actuator:
     """The same actuator with sensors that read between their counts, and without noise; delays and errors stay."""
-
-    def smooth(sensor: AngleSensor | CurrentSensor | None) -> AngleSensor | CurrentSensor | None:
-        return None if sensor is None else replace(sensor, resolution=None, noise=None)
-
-    sensors = actuator.sensors
-    names = ("motor", "load", "current")
-    return replace(actuator, sensors=replace(sensors, **{name: smooth(getattr(sensors, name)) for name in names}))
+    return replace(actuator, sensors=actuator.sensors.with_each(resolution=None, noise=None))
 
 
 def lifted(point: OperatingPoint, columns: Sequence[int], rows: Sequence[int], every: int) -> tuple[np.ndarray, ...]:

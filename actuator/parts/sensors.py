@@ -6,7 +6,7 @@ memory and the true value at the tick.
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from typing import Annotated, Any
 
 import casadi as ca
@@ -149,6 +149,14 @@ class Sensors:
     motor: Annotated[AngleSensor | None, SensorOf("motor")] = None
     load: Annotated[AngleSensor | None, SensorOf("load")] = None
     current: Annotated[CurrentSensor | None, SensorOf("current")] = None
+
+    def present(self) -> dict[str, AngleSensor | CurrentSensor]:
+        """Those that there are, by name."""
+        return {each.name: sensor for each in fields(self) if (sensor := getattr(self, each.name)) is not None}
+
+    def with_each(self, **changes: Any) -> "Sensors":
+        """The same sensors, with these fields changed in each that there is."""
+        return replace(self, **{name: replace(sensor, **changes) for name, sensor in self.present().items()})
 
 
 def _count(sensor: AngleSensor | CurrentSensor) -> int:

@@ -110,8 +110,8 @@ def _require_temperatures(actuator: Parts) -> None:
 
 def _require_continuous(actuator: Parts) -> None:
     """Nothing that only samples can do."""
-    for name, sensor in vars(actuator.sensors).items():
-        if sensor is not None and (sensor.memory() or sensor.resolution is not None):
+    for name, sensor in actuator.sensors.present().items():
+        if sensor.memory() or sensor.resolution is not None:
             raise ValueError(
                 f"Actuator.sensors.{name}: resolution, noise and delay need a sampled controller: give the "
                 "actuator a sampling, or leave them out"

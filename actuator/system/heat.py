@@ -34,12 +34,12 @@ class HeatFlow:
     chopper. A node that is not there neither heats nor is heated.
     """
 
-    def __init__(self, book: SystemBuilder, network: ThermalNetwork | None) -> None:
-        self.book, self.network = book, network
+    def __init__(self, builder: SystemBuilder, network: ThermalNetwork | None) -> None:
+        self.builder, self.network = builder, network
         self.at: dict[str, Scalar] = {}
         if network is not None:
             states = {
-                name: book.state(
+                name: builder.state(
                     f"thermal.{name}",
                     "K",
                     WARM,
@@ -87,4 +87,4 @@ class HeatFlow:
                 heat[node] = heat.get(node, 0.0) + ca.SX(loss)
         states = {name: self.at[name] for name in self.network.free}
         for name, rate in self.network.rates(states, heat).items():
-            self.book.rate(f"thermal.{name}", rate)
+            self.builder.rate(f"thermal.{name}", rate)

@@ -20,6 +20,7 @@ from importlib.metadata import entry_points
 from typing import Any, Protocol, TypeVar
 
 GROUP = "geared_actuator.parts"
+OPEN_ENDED = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
 
 Part = TypeVar("Part", bound=type)
 _parts: dict[type, dict[str, type]] = {}
@@ -133,10 +134,10 @@ def _require_signature(made: type, slot: type, name: str, asked: Callable[..., A
     if not callable(given) or name in getattr(made, "__dataclass_fields__", {}):
         raise PartError(f"{made.__name__} is no {slot.__name__}: {name} is no method")
     wanted, found = inspect.signature(asked).parameters, inspect.signature(given).parameters
+    open_ended = [any(value.kind in OPEN_ENDED for value in those.values()) for those in (wanted, found)]
     extra = [key for key, value in found.items() if key not in wanted and value.default is value.empty]
     missing = [key for key in wanted if key not in found]
-    open_ended = any(value.kind in (value.VAR_POSITIONAL, value.VAR_KEYWORD) for value in found.values())
-    if (missing or extra) and not open_ended:
+    if (missing or extra) and not any(open_ended):
         raise PartError(
             f"{made.__name__} is no {slot.__name__}: {name}{inspect.signature(given)} should take "
             f"{inspect.signature(asked)}"

@@ -24,7 +24,7 @@ from actuator.system.outputs import Mechanics, observe
 from actuator.system.parameters import Parameter, parameterize, with_values
 from controllers.controller import Controller, PlantMotion
 from controllers.sampling import Sampling
-from gear.quantities.roles import Heat, ShaftAngle, ShaftSpeed
+from gear.quantities.roles import FrictionMemory, Heat, ShaftAngle, ShaftSpeed
 from gear.transmission import Transmission
 
 ANGLE = 1e-4  # rad, a usual size; an angle is fine when the deflection of teeth is
@@ -148,7 +148,9 @@ class _Assembly:
         inertia = {name: shaft.inertia for name, shaft in gear.shafts.items()}
         inertia[gear.input] += parts["motor"].rotor_inertia()
         inertia[gear.output] += parts["load"].inertia_at(motion.load_angle)
-        contacts = ContactMechanics(gear, actuator.gear.redundant(), kinematics, inertia)
+        creeping = actuator.gear.laws_with_memory()
+        memory = {path: [ca.SX.sym(f"gear.{path}.{k.name}") for k in law.memory()] for path, law in creeping.items()}
+        contacts = ContactMechanics(gear, actuator.gear.redundant(), kinematics, inertia, memory)
 
         names = () if actuator.controller is None else actuator.controller.loops()
         loops, due = build_loops(book, names, parts["sampling"], actuator.sampling)
@@ -178,6 +180,11 @@ class _Assembly:
                 owner = f"shaft {shaft}"
                 book.state(symbol.name(), unit, nominal, symbol=symbol, roles=(role(shaft),), owner=owner)
                 book.rate(symbol.name(), rates[shaft])
+        for path, law in creeping.items():
+            more = {"roles": (FrictionMemory(f"gear.{path}"),), "owner": f"{type(law).__name__} of gear.{path}"}
+            for kept, symbol, rate in zip(law.memory(), memory[path], forces.by_memory[path][1], strict=True):
+                book.state(symbol.name(), kept.unit, kept.nominal, initial=kept.initial, symbol=symbol, **more)
+                book.rate(symbol.name(), rate)
         seen = Mechanics(contacts, forces, modes, angle, speed, torque)
         observe(book, seen, motion)
         context.losses.update(seen.losses())
@@ -253,7 +260,7 @@ def _check_values(actuator: Actuator, values: Mapping[str, float]) -> None:
 
 def _travel(gear: Transmission) -> dict[str, int]:
     """Direction of each contact when the output moves forward."""
-    turns = gear.travel()
+    turns = gear.speed_ratios()
     slips = {
         f"gear.{contact.name}": sum(float(c) * turns[shaft] for shaft, c in contact.slip.items())
         for contact in gear.contacts()

@@ -1,7 +1,7 @@
 """The mechanics between motor and load: laws, meshes, bearings, transmissions."""
 
-from gear.couplings import Coupling as Coupling
-from gear.couplings import EndStop as EndStop
+from gear.couplings.coupling import Coupling as Coupling
+from gear.couplings.end_stop import EndStop as EndStop
 from gear.elasticity.backlash import Backlash as Backlash
 from gear.elasticity.backlash import BacklashAsPrinted as BacklashAsPrinted
 from gear.elasticity.curves import elasticity_curves as elasticity_curves
@@ -25,7 +25,6 @@ from gear.friction.periodic import PeriodicFriction as PeriodicFriction
 from gear.friction.tabulated_efficiency import EfficiencyPoint as EfficiencyPoint
 from gear.friction.tabulated_efficiency import TabulatedEfficiency as TabulatedEfficiency
 from gear.harmonics import Harmonic as Harmonic
-from gear.jam import jam as jam
 from gear.lubrication.drag import Palmgren as Palmgren
 from gear.lubrication.drag import Thickening as Thickening
 from gear.lubrication.lubricant import GivenViscosity as GivenViscosity
@@ -38,8 +37,10 @@ from gear.lubrication.viscosity import Walther as Walther
 from gear.mesh import BearingForce as BearingForce
 from gear.mesh import Mesh as Mesh
 from gear.quantities import renamed as _renamed
-from gear.shafts import Bearing as Bearing
-from gear.shafts import Shaft as Shaft
+from gear.shafts.bearing import Bearing as Bearing
+from gear.shafts.brake import Brake as Brake
+from gear.shafts.brake import add_brake as add_brake
+from gear.shafts.law import Shaft as Shaft
 from gear.teeth.engagement import Engagement as Engagement
 from gear.teeth.geometry import ExternalPair as ExternalPair
 from gear.teeth.geometry import GivenPair as GivenPair
@@ -47,5 +48,5 @@ from gear.teeth.internal import InternalPair as InternalPair
 from gear.teeth.screw import ScrewPair as ScrewPair
 from gear.transmission import Transmission as Transmission
 
-FORMER: dict[str, str] = {}  # until 0.3
+FORMER = {"jam": "add_brake", "FrictionLaws": "FrictionLaw", "ElasticityLaws": "ElasticityLaw"}  # until 0.3
 __getattr__ = _renamed(__name__, FORMER)

@@ -7,7 +7,7 @@ project knows these sets. For planets that are lumped here and can be taken apar
 from collections.abc import Mapping, Sequence
 
 from gear.planets import RIGID, MeshLaws, Planets
-from gear.shafts import Bearing, Shaft
+from gear.shafts.law import Shaft, ShaftBearing
 from gear.teeth.geometry import ExternalPair, GivenPair
 from gear.teeth.internal import InternalPair
 from gear.transmission import Transmission
@@ -19,7 +19,7 @@ def train(
     stages: Sequence[ExternalPair | GivenPair],
     inertias: Sequence[float],
     laws: MeshLaws | Sequence[MeshLaws] = RIGID,
-    bearings: Mapping[str, Bearing] | None = None,
+    bearings: Mapping[str, ShaftBearing] | None = None,
 ) -> Transmission:
     """Spur gears one after the other on fixed axes: shafts shaft_0 (input) to shaft_n (output).
 
@@ -31,7 +31,7 @@ def train(
         Of the shafts [kg m^2], one more than stages.
     laws : MeshLaws or a sequence of them
         For all stages, or per stage.
-    bearings : mapping of str to Bearing or None
+    bearings : mapping of str to ShaftBearing or None
         By name.
     """
     if len(inertias) != len(stages) + 1:

@@ -82,7 +82,7 @@ def balance(
     """
     if output_speed == 0:
         raise ValueError("balance: output_speed must not be 0 rad/s; its sign is the direction of motion")
-    speeds = {name: turns * output_speed for name, turns in gear.travel().items()}
+    speeds = {name: turns * output_speed for name, turns in gear.speed_ratios().items()}
     shafts = [name for name in gear.shafts if name not in gear.fixed]
     outside = dict.fromkeys(gear.shafts, 0.0) | {gear.output: output_torque}
     loss = {}

@@ -1,5 +1,6 @@
 """A transmission as a table and as a drawing: shafts, meshes, teeth, speeds, torques."""
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from gear.balance import balance
@@ -78,10 +79,9 @@ def draw(gear: Transmission, *, output_torque: float = -1.0, output_speed: float
     for name, mesh in gear.meshes.items():
         _draw_mesh(axes, places, mesh, name)
     for coupling in gear.couplings.values():
-        if coupling.b is None:
-            continue
-        (x0, y0), (x1, y1) = places[coupling.a], places[coupling.b]
-        axes.plot([x0, x1], [y0, y1], color="#4d4d4d", linestyle="--", zorder=1)
+        for a, b in pairwise(coupling.terminals().values()):
+            (x0, y0), (x1, y1) = places[a], places[b]
+            axes.plot([x0, x1], [y0, y1], color="#4d4d4d", linestyle="--", zorder=1)
     outside = {gear.input: found.input_torque, gear.output: output_torque}
     for name, (x, y) in places.items():
         role = _role(gear, name)
@@ -126,7 +126,7 @@ def _draw_mesh(axes: "Axes", places: dict[str, tuple[float, float]], mesh: Mesh,
 def _layout(gear: Transmission) -> dict[str, tuple[float, float]]:
     """Columns by distance from the input through meshes and couplings, carriers on a row of their own below."""
     joined = [(mesh.a, mesh.b) for mesh in gear.meshes.values()]
-    joined += [(c.a, c.b) for c in gear.couplings.values() if c.b is not None]
+    joined += [pair for c in gear.couplings.values() for pair in pairwise(c.terminals().values())]
     carriers = {mesh.carrier for mesh in gear.meshes.values() if mesh.carrier}
     start = gear.input if gear.input not in carriers else next(a for a, _ in joined)
     column, front = {start: 0}, [start]

@@ -131,6 +131,10 @@ class Mesh:
             pair=self.pair,
         )
 
+    def terminals(self) -> dict[str, str]:
+        """Names of shafts, by the field that names them."""
+        return {"a": self.a, "b": self.b} | ({} if self.carrier is None else {"carrier": self.carrier})
+
     def _per_shaft(self, a: Scalar, b: Scalar) -> dict[str, Scalar]:
         """Coefficients on the absolute motion of the shafts, from those on the motion relative to the carrier."""
         return {self.a: a, self.b: b} | ({} if self.carrier is None else {self.carrier: -(a + b)})

@@ -21,9 +21,9 @@ class MeshMotion(NamedTuple):
 
 
 class Sliding(NamedTuple):
-    """State of a sliding mesh, for the laws of its friction; the direction is in the mode, so speed is >= 0."""
+    """State of a mesh, for the laws of its friction; a law that sticks is asked for a direction that the mode knows."""
 
-    speed: Scalar  # mesh speed [m/s], >= 0
+    speed: Scalar  # mesh speed [m/s], >= 0; with its sign for laws that do not stick
     force: Scalar  # normal force [N], >= 0
     a_drives: Scalar  # 1 where wheel A drives, 0 where wheel B does
     position: Scalar  # x_mesh [m]

@@ -14,7 +14,7 @@ from gear.elasticity.law import ElasticityLaw
 from gear.friction.law import FrictionLaw
 from gear.mesh import Mesh
 from gear.quantities import Inertia, check, check_count
-from gear.shafts import Shaft
+from gear.shafts.law import Shaft
 from gear.teeth.pair import Pair
 from gear.transmission import Transmission
 
@@ -113,7 +113,7 @@ def separate(gear: Transmission, *shafts: str) -> Transmission:
         f"{kind}.{name}"
         for kind in ("bearings", "couplings", "drags")
         for name, part in getattr(gear, kind).items()
-        if {getattr(part, end, None) for end in ("shaft", "a", "b")} & set(shafts)
+        if set(part.terminals().values()) & set(shafts)
     ]
     if loaded:
         raise ValueError(f"separate: {loaded[0]} is that of all planets together; add it to the separate ones instead")

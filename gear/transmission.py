@@ -1,19 +1,20 @@
 """A transmission: shafts joined by meshes and couplings, carried by bearings, ended by stops."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
-from gear.couplings import Coupling, EndStop, Twist
+from gear.couplings.law import ShaftCoupling, ShaftSpring, ShaftStop, Twist
+from gear.friction.law import FrictionLaw
 from gear.kinematics import Kinematics
 from gear.mesh import MESH_SPEED_NOMINAL, Mesh
 from gear.motion import MeshMotion, Sliding
 from gear.quantities import Scalar
-from gear.shafts import Bearing, Drag, Shaft
+from gear.shafts.law import Shaft, ShaftBearing, ShaftDrag
 
 BEARING_SPEED_NOMINAL = 1.0  # rad/s
 RANK = 1e-9  # motion of the output below which it stands still
@@ -21,7 +22,7 @@ BEARING_TORQUE_FLOOR = 1e-3  # N m; keeps the scale of a frictionless bearing fi
 
 
 class Contact(NamedTuple):
-    """A place where friction can stick, as the joint decision sees it."""
+    """A place where friction acts, as the joint decision sees it if it sticks."""
 
     name: str  # path of the mesh or bearing in the transmission
     place: str  # "mesh" or "bearing"
@@ -42,7 +43,7 @@ class Transmission:
     ----------
     shafts : mapping of str to Shaft
         By name; the order is the order of the states.
-    meshes, couplings, bearings, drags, stops : mapping of str to Mesh, Coupling, Bearing, Drag, EndStop
+    meshes, bearings, couplings, drags, stops : mappings of str to Mesh, ShaftBearing, ShaftCoupling, ...
         By name; they refer to shafts by name.
     input, output : str
         Names of the shafts on which the motor and the load act.
@@ -58,10 +59,10 @@ class Transmission:
 
     shafts: Mapping[str, Shaft]
     meshes: Mapping[str, Mesh] = field(default_factory=dict)
-    bearings: Mapping[str, Bearing] = field(default_factory=dict)
-    couplings: Mapping[str, Coupling] = field(default_factory=dict)
-    drags: Mapping[str, Drag] = field(default_factory=dict)
-    stops: Mapping[str, EndStop] = field(default_factory=dict)
+    bearings: Mapping[str, ShaftBearing] = field(default_factory=dict)
+    couplings: Mapping[str, ShaftCoupling] = field(default_factory=dict)
+    drags: Mapping[str, ShaftDrag] = field(default_factory=dict)
+    stops: Mapping[str, ShaftStop] = field(default_factory=dict)
     input: str
     output: str
     fixed: tuple[str, ...] = ()
@@ -77,7 +78,7 @@ class Transmission:
                 raise ValueError(f"Transmission.fixed names shaft {name!r}, which is the input or output")
         for name, bearing in self.bearings.items():
             rigid = [key for key, mesh in self.meshes.items() if mesh.rigid and bearing.shaft in (mesh.a, mesh.b)]
-            if bearing.load_arm > 0 and rigid:
+            if bearing.carries_load and rigid:
                 raise ValueError(
                     f"Transmission: bearing {name!r} takes its load from mesh {rigid[0]!r}, which is rigid; give "
                     "the mesh an elasticity, or load_arm = 0"
@@ -91,10 +92,7 @@ class Transmission:
         found = []
         for kind in ("meshes", "couplings", "bearings", "drags", "stops"):
             for name, part in getattr(self, kind).items():
-                for terminal in ("a", "b", "carrier", "shaft"):
-                    shaft = getattr(part, terminal, None)
-                    if shaft is not None:
-                        found.append((f"{kind}.{name}.{terminal}", shaft))
+                found += [(f"{kind}.{name}.{field}", shaft) for field, shaft in part.terminals().items()]
         return found
 
     def _require_connected(self) -> None:
@@ -111,7 +109,7 @@ class Transmission:
             )
 
     def _require_positive_stuck_inertia(self, name: str, mesh: Mesh, kinematics: Kinematics) -> None:
-        if mesh.friction is None or mesh.stick_by == "conjugate speed":
+        if mesh.friction is None or not mesh.friction.sticks or mesh.stick_by == "conjugate speed":
             return
         inertia = kinematics.solver({shaft: part.inertia for shaft, part in self.shafts.items()})
         answer = inertia.accelerations(mesh.torque_per_friction())
@@ -130,8 +128,11 @@ class Transmission:
             constraints[k] += [mesh.deflection_per_shaft() for mesh in gear.meshes.values() if mesh.rigid]
         return Kinematics(list(self.shafts), *constraints, keep=[self.output, self.input])
 
-    def contacts(self) -> list[Contact]:
-        """Every place that can stick, along the shafts, so that neighbors in the list are neighbors in the train."""
+    def contacts(self, *, sticking: bool = True) -> list[Contact]:
+        """Every place that can stick, along the shafts, so that neighbors in the list are neighbors in the train.
+
+        Or those whose friction law has an internal state and never sticks.
+        """
         found = []
         for shaft in self.shafts:
             found += [
@@ -144,7 +145,7 @@ class Transmission:
                     ca.fmax(bearing.holding(0.0), BEARING_TORQUE_FLOOR),
                 )
                 for name, bearing in self.bearings.items()
-                if bearing.shaft == shaft
+                if bearing.shaft == shaft and bearing.sticks is sticking
             ]
             found += [
                 Contact(
@@ -156,7 +157,7 @@ class Transmission:
                     mesh.count * mesh.law().force_scale(),
                 )
                 for name, mesh in self.meshes.items()
-                if mesh.a == shaft and mesh.friction is not None
+                if mesh.a == shaft and mesh.friction is not None and mesh.friction.sticks is sticking
             ]
         return found
 
@@ -179,16 +180,18 @@ class Transmission:
         ValueError
             Where input and output are not joined by a single-valued ratio.
         """
-        return self.travel()[self.input]
+        return self.speed_ratios()[self.input]
 
-    def travel(self) -> dict[str, float]:
+    def speed_ratios(self) -> dict[str, float]:
         """Turns of every shaft per turn of the output shaft, all teeth and couplings rigid; errors as `ratio`."""
         rigid = [mesh.deflection_per_shaft() for mesh in self.meshes.values()] + [{name: 1.0} for name in self.fixed]
-        rigid += [coupling.twist_per_shaft() for coupling in self.couplings.values() if coupling.b is not None]
+        stiff = [coupling for coupling in self.couplings.values() if coupling.rigid]
+        rigid += [coupling.twist_per_shaft() for coupling in stiff if len(coupling.terminals()) > 1]
         kinematics = Kinematics(list(self.shafts), rigid, rigid, keep=[self.output])
         if len(kinematics.independent) > 1:  # a mounting stands still; a return spring does not lock
-            mountings = [c for c in self.couplings.values() if c.b is None and c.a not in (self.input, self.output)]
-            rigid += [coupling.twist_per_shaft() for coupling in mountings]
+            ends = ([self.input], [self.output])
+            mountings = [(coupling, list(coupling.terminals().values())) for coupling in stiff]
+            rigid += [c.twist_per_shaft() for c, on in mountings if len(on) == 1 and on not in ends]
             kinematics = Kinematics(list(self.shafts), rigid, rigid, keep=[self.output])
         free = kinematics.independent
         turns = {name: float(row.get(free[0], 0.0)) for name, row in kinematics.turns.items()} if free else {}
@@ -202,9 +205,9 @@ class Transmission:
 
     def output_range(self) -> tuple[float, float]:
         """Angles [rad] of the output between which no end stop is touched, all teeth and couplings rigid."""
-        turns = self.travel() if self.stops else {}
-        reached = [(stop, turns[stop.shaft]) for stop in self.stops.values() if turns[stop.shaft] != 0]
-        ends = [sorted((stop.lower / turn, stop.upper / turn)) for stop, turn in reached]
+        turns = self.speed_ratios() if self.stops else {}
+        twists = [(stop, sum(c * turns[s] for s, c in stop.twist_per_shaft().items())) for stop in self.stops.values()]
+        ends = [sorted(end / twist for end in stop.free_range()) for stop, twist in twists if twist != 0]
         return max((low for low, _ in ends), default=-math.inf), min((high for _, high in ends), default=math.inf)
 
     def _matrix(self, rows: list[dict[str, Scalar]]) -> np.ndarray:
@@ -223,9 +226,9 @@ class Transmission:
             for name, motion in motions.items()
         }
 
-    def springs(self) -> dict[str, Coupling | EndStop]:
+    def springs(self) -> dict[str, ShaftSpring]:
         """Couplings and end stops, by path."""
-        couplings = {f"couplings.{name}": coupling for name, coupling in self.couplings.items()}
+        couplings: dict[str, ShaftSpring] = {f"couplings.{name}": part for name, part in self.couplings.items()}
         return couplings | {f"stops.{name}": stop for name, stop in self.stops.items()}
 
     def twists(self, angle: Mapping[str, Scalar], speed: Mapping[str, Scalar]) -> dict[str, Twist]:
@@ -267,23 +270,45 @@ class Transmission:
         """Friction limits of each contact, both >= 0: at rest, and while sliding at `slip` >= 0 in `direction` +-1."""
         limits = {}
         for name, bearing in self.bearings.items():
-            path, load = f"bearings.{name}", self.bearing_load(bearing, normal)
-            limits[path] = (bearing.holding(load), bearing.sliding(load, slip[path]))
+            if bearing.sticks:
+                path, load = f"bearings.{name}", self.bearing_load(bearing, normal)
+                limits[path] = (bearing.holding(load), bearing.sliding(load, slip[path]))
         for name, mesh in self.meshes.items():
-            if mesh.friction is None:
-                continue
-            path, force = f"meshes.{name}", ca.fabs(normal[name])
-            sliding = Sliding(
-                speed=slip[path] * mesh.speed_per_slip(),
-                force=force / mesh.count,
-                a_drives=ca.if_else(direction[path] * normal[name] >= 0, 1, 0),
-                position=motions[name].position,
-                pair=mesh.pair,
-            )
-            limits[path] = (mesh.friction.breakaway(sliding) * force, mesh.friction.coefficient(sliding) * force)
+            if mesh.friction is not None and mesh.friction.sticks:
+                path, force = f"meshes.{name}", ca.fabs(normal[name])
+                sliding = _sliding(mesh, motions[name], normal[name], slip[path], direction[path])
+                limits[path] = (mesh.friction.breakaway(sliding) * force, mesh.friction.coefficient(sliding) * force)
         return limits
 
-    def bearing_load(self, bearing: Bearing, normal: Mapping[str, Scalar]) -> Scalar:
+    def laws_with_memory(self) -> dict[str, ShaftBearing | FrictionLaw]:
+        """Each friction law that does not stick, by path."""
+        laws: dict[str, ShaftBearing | FrictionLaw] = {f"bearings.{name}": part for name, part in self.bearings.items()}
+        laws |= {f"meshes.{name}": mesh.friction for name, mesh in self.meshes.items() if mesh.friction is not None}
+        return {path: law for path, law in laws.items() if not law.sticks}
+
+    def friction_by_memory(
+        self,
+        memory: Mapping[str, Sequence[Scalar]],
+        motions: Mapping[str, MeshMotion],
+        normal: Mapping[str, Scalar],
+        slip: Mapping[str, Scalar],
+    ) -> dict[str, tuple[Scalar, list[Scalar]]]:
+        """Friction scalar and rates of the internal state of each law that does not stick, at a signed slip speed."""
+        found = {}
+        for name, bearing in self.bearings.items():
+            if not bearing.sticks:
+                path, load = f"bearings.{name}", self.bearing_load(bearing, normal)
+                state = (memory[path], load, slip[path])
+                found[path] = (bearing.friction(*state), bearing.rates(*state))
+        for name, mesh in self.meshes.items():
+            if mesh.friction is not None and not mesh.friction.sticks:
+                path, law = f"meshes.{name}", mesh.friction
+                sliding = _sliding(mesh, motions[name], normal[name], slip[path], slip[path])
+                friction = law.friction(memory[path], sliding) * ca.fabs(normal[name])
+                found[path] = (friction, law.rates(memory[path], sliding))
+        return found
+
+    def bearing_load(self, bearing: ShaftBearing, normal: Mapping[str, Scalar]) -> Scalar:
         """Sum of the sizes of the normal forces [N] on the wheels of the bearing's shaft."""
         return sum(
             (ca.fabs(f) for name, f in normal.items() if bearing.shaft in (self.meshes[name].a, self.meshes[name].b)),
@@ -303,3 +328,14 @@ class Transmission:
         for path, twist in self.twists(angle, dict.fromkeys(self.shafts, 0.0)).items():
             stored += self.springs()[path].stored(twist, flank[path])
         return stored
+
+
+def _sliding(mesh: Mesh, motion: MeshMotion, normal: Scalar, slip: Scalar, direction: Scalar) -> Sliding:
+    """What a mesh tells its friction law at a slip speed, with the signed normal force [N] of all its equal ones."""
+    return Sliding(
+        speed=slip * mesh.speed_per_slip(),
+        force=ca.fabs(normal) / mesh.count,
+        a_drives=ca.if_else(direction * normal >= 0, 1, 0),
+        position=motion.position,
+        pair=mesh.pair,
+    )

@@ -174,7 +174,7 @@ def test_rigid_teeth_leave_one_degree_of_freedom():
 def test_rigid_and_stiff_teeth_accelerate_alike():
     """With rigid teeth the inertia at the sun is the closed form J_s + sum of J_i turns_i^2."""
     gear = simple(MeshLaws())
-    turns = gear.travel()
+    turns = gear.speed_ratios()
     turns = {name: value / turns["sun"] for name, value in turns.items()}
     inertia = sum(shaft.inertia * turns[name] ** 2 for name, shaft in gear.shafts.items())
     plant = Actuator(motor=TorqueSource(), gear=gear)

@@ -13,7 +13,7 @@ from oracles import gradient_in_symbols, in_symbols, numbers, pressed, signs
 
 from gear import (
     Backlash,
-    Bearing,
+    Brake,
     Coupling,
     EndStop,
     ExternalPair,
@@ -21,7 +21,7 @@ from gear import (
     Mesh,
     Shaft,
     Transmission,
-    jam,
+    add_brake,
 )
 from gear.balance import balance
 from gear.couplings import Twist
@@ -167,9 +167,9 @@ def test_range_of_the_output_is_that_of_the_nearest_stop_through_the_gear():
     assert mounted().output_range() == (-math.inf, math.inf)
 
 
-def test_a_jam_is_a_bearing_that_rubs_at_every_speed():
-    jammed = jam(mounted(), "wheel", 40.0)
-    assert jammed.bearings == {"jam_wheel": Bearing(shaft="wheel", coulomb=40.0, breakaway=40.0)}
+def test_a_brake_is_a_bearing_that_rubs_at_every_speed():
+    jammed = add_brake(mounted(), "wheel", 40.0)
+    assert jammed.bearings == {"brake_wheel": Brake(shaft="wheel", torque=40.0)}
     assert jammed.shafts == SHAFTS
 
 

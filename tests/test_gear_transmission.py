@@ -68,7 +68,7 @@ speeds = st.tuples(*(numbers(-10, 10) for _ in SHAFTS))
 def test_ratio_of_a_train_is_the_product_of_its_stages_each_turning_round(stages):
     ratios = [-b / a for a, b in stages]
     assert train(stages).ratio() == pytest.approx(math.prod(ratios), rel=1e-9)
-    turns = train(stages).travel()
+    turns = train(stages).speed_ratios()
     assert list(turns.values()) == pytest.approx([math.prod(ratios[k:]) for k in range(len(stages) + 1)], rel=1e-9)
 
 
@@ -88,7 +88,7 @@ def test_a_coupling_and_a_single_shaft_turn_one_to_one():
 def test_planetary_set_with_a_fixed_sun_follows_willis():
     """(w_sun - w_c) / (w_fixed - w_c) = (z2 z4) / (z1 z3), so w_sun / w_c = 1 - (z2 z4) / (z1 z3)."""
     z1, z2, z3, z4 = PLANETS
-    turns = planetary().travel()
+    turns = planetary().speed_ratios()
     assert turns["sun"] == pytest.approx(1 - z2 * z4 / (z1 * z3))
     assert turns["planet"] == pytest.approx(1 + z4 / z3)
     assert (turns["carrier"], turns["fixed_sun"]) == pytest.approx((1, 0))
@@ -289,6 +289,6 @@ def test_rigid_teeth_reflect_inertia_by_the_square_of_the_ratio():
 
 def test_rigid_planetary_set_moves_as_willis_says():
     rigid = {name: dataclasses.replace(m, elasticity=None, friction=None) for name, m in planetary().meshes.items()}
-    kinematics, turns = planetary(meshes=rigid).kinematics(), planetary().travel()
+    kinematics, turns = planetary(meshes=rigid).kinematics(), planetary().speed_ratios()
     (free,) = kinematics.independent
     assert kinematics.expand({free: turns[free]}) == pytest.approx(turns, abs=1e-12)

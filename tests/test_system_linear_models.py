@@ -214,7 +214,7 @@ FLOATING = {"load.stiffness": 0.0}  # so that no position differs from another
 @pytest.fixture(scope="module")
 def steady():
     """The aileron drive on its way at constant speed, all contacts sliding; `trim` cannot hold a common speed."""
-    system, travel = aileron().system(), aileron().gear.travel()
+    system, travel = aileron().system(), aileron().gear.speed_ratios()
     run = simulate(system, 1.0, inputs={"reference": Ramp(slope=SLOPE)}, parameters=FLOATING)
     assert run.changes[-1].time < 0.1
     assert "stuck" not in {str(modes[-1]) for modes in run.modes.values()}

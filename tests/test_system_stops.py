@@ -14,7 +14,7 @@ from scipy.linalg import eigh
 
 from actuator import Actuator, Load, Sine, Step, TorqueSource, linearize, simulate, trim
 from controllers import PID
-from gear import Bearing, Coupling, EndStop, ExternalPair, GivenPair, Mesh, Shaft, Transmission, jam
+from gear import Bearing, Coupling, EndStop, ExternalPair, GivenPair, Mesh, Shaft, Transmission, add_brake
 
 INERTIA, STIFFNESS, SPEED = 2.0, 1e4, 1.0
 LOWER, UPPER = -0.3, 0.5
@@ -188,18 +188,18 @@ def test_the_coupling_is_trimmed_on_the_flank_that_the_load_chooses():
         np.testing.assert_allclose(poles, np.sqrt(np.repeat(squares, 2)), rtol=1e-9)
 
 
-# -- jams -----------------------------------------------------------------------------------------------
+# -- brakes and jams -----------------------------------------------------------------------------------------------
 
 
-JAM = "gear.bearings.jam_load"
+JAM = "gear.bearings.brake_load"
 
 
 def with_jam(torque):
-    return {f"{JAM}.coulomb": torque, f"{JAM}.breakaway": torque}
+    return {f"{JAM}.torque": torque}
 
 
 def test_a_load_jams_on_the_way():
-    actuator = driven(jam(two_masses().gear, "load", 0.0))
+    actuator = driven(add_brake(two_masses().gear, "load", 0.0))
     push = {"torque_reference": 2.0}
     free = simulate(actuator, 0.5, inputs=push)
     assert free["load.speed"][-1] == pytest.approx(2.0 * 0.5 / 4.0, rel=0.05)
@@ -212,7 +212,7 @@ def test_a_load_jams_on_the_way():
 @pytest.mark.parametrize(("torque", "holds"), [(3.99, False), (4.01, True)])
 def test_a_jam_holds_up_to_its_torque(torque, holds):
     """A step of 2 N m swings up to twice that in the coupling."""
-    actuator = driven(jam(two_masses().gear, "load", 0.0))
+    actuator = driven(add_brake(two_masses().gear, "load", 0.0))
     run = simulate(actuator, 0.1, inputs={"torque_reference": 2.0}, parameters=with_jam(torque))
     assert (set(run.modes[JAM]) == {"stuck"}) == holds
 

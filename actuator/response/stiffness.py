@@ -12,7 +12,7 @@ from actuator.actuator import Actuator
 from actuator.parts.torque_source import TorqueSource
 from actuator.response.frequency_response import FrequencyResponse, frequency_response
 from actuator.system.hybrid import HybridSystem
-from gear.transmission import Bearing
+from gear.shafts.brake import Brake
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -50,7 +50,7 @@ def locked(actuator: Actuator) -> Actuator:
     loose = unpowered(actuator)
     gear = loose.gear
     others = {name: bearing for name, bearing in gear.bearings.items() if bearing.shaft != gear.input}
-    block = Bearing(shaft=gear.input, coulomb=BLOCK, breakaway=BLOCK)
+    block = Brake(shaft=gear.input, torque=BLOCK)
     return replace(
         loose, gear=replace(gear, bearings={**others, "block": block}), name=f"{actuator.name}, motor blocked"
     )

@@ -38,7 +38,7 @@ def find_rest(
     if isinstance(plant, Actuator):
         # all shafts where the reference is: an integrator that has no gain would hold any other angle
         angles = {
-            f"{shaft}.angle": turns * inputs.get("reference", 0.0) for shaft, turns in plant.gear.travel().items()
+            f"{shaft}.angle": turns * inputs.get("reference", 0.0) for shaft, turns in plant.gear.speed_ratios().items()
         }
         near = {name: float(angle) for name, angle in angles.items() if name in names}
 

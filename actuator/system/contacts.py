@@ -7,7 +7,7 @@ import casadi as ca
 
 from actuator.system.hybrid import MARGIN_BAND, Event, EventKind, Mode, ModeKind, Place
 from actuator.system.hybrid import Contact as ContactRecord
-from gear.couplings import TWIST_NOMINAL, EndStop, Twist
+from gear.couplings.law import TWIST_NOMINAL, Twist
 from gear.elasticity.law import DEFLECTION_NOMINAL, has_gap
 from gear.kinematics import Kinematics
 from gear.motion import MeshMotion
@@ -39,6 +39,8 @@ class ContactForces(NamedTuple):
     compliance: Matrix  # G of the joint decision
     demand: Matrix  # slip acceleration without contact friction
     friction: Matrix  # the friction scalars of the present modes
+    smooth: dict[str, Matrix]  # torque per shaft of teeth, couplings, stops and viscous drag [N m]
+    by_memory: dict[str, tuple[Matrix, list[Matrix]]]  # per law that does not stick, by path: friction scalar, rates
     acceleration: dict[str, Matrix]  # per shaft [rad/s^2]
 
 
@@ -55,14 +57,23 @@ class ContactMechanics:
         Which shafts move independently.
     inertia : mapping of str to SX
         Total inertia per shaft; it may depend on the angles.
+    memory : mapping of str to list of SX
+        Internal state of each friction law that does not stick, by path. Such a contact has no modes: its friction is a
+        torque as that of a spring is.
     """
 
     def __init__(
-        self, gear: Transmission, redundant: bool, kinematics: Kinematics, inertia: Mapping[str, Scalar]
+        self,
+        gear: Transmission,
+        redundant: bool,
+        kinematics: Kinematics,
+        inertia: Mapping[str, Scalar],
+        memory: Mapping[str, list[ca.SX]],
     ) -> None:
         self.gear, self.redundant, self.kinematics = gear, redundant, kinematics
         self.masses, self.inertia = inertia, kinematics.solver(inertia)
         self.contacts: list[Contact] = gear.contacts()
+        self.creeping, self.memory = gear.contacts(sticking=False), memory
         # without a gap the flank only matters to friction, where the size of the normal force has a kink
         laws = {name: mesh.law() for name, mesh in gear.meshes.items() if not mesh.rigid}
         self.laws = {
@@ -72,6 +83,7 @@ class ContactMechanics:
         }
         still = Twist(0.0, 0.0)
         self.plays = {path: part for path, part in gear.springs().items() if part.penetration(still, 1.0) is not None}
+        self.mesh_at = {f"meshes.{name}": name for name in laws}
         self.gapped = [path for path, law in self.laws.items() if has_gap(law)] + [*self.plays]
         self.flanks = [*self.laws, *self.plays]
 
@@ -85,7 +97,7 @@ class ContactMechanics:
         """What has a flank: a mesh, a coupling or an end stop."""
         if path in self.laws:
             return Place.MESH
-        return Place.STOP if isinstance(self.plays[path], EndStop) else Place.COUPLING
+        return Place.STOP if path in {f"stops.{name}" for name in self.gear.stops} else Place.COUPLING
 
     def records(self, directions: Mapping[str, int]) -> list[ContactRecord]:
         """The contacts as analyses know them; `directions` in which they slide when the output moves forward."""
@@ -129,7 +141,11 @@ class ContactMechanics:
         twists = self.gear.twists(angle, speed)
         passed = self.gear.passed_torques(twists, modes.flank)
         smooth = self.gear.torques(speed, normal, passed)
-        free = self.inertia.accelerations({shaft: value + torque.get(shaft, 0) for shaft, value in smooth.items()})
+        creep = {contact.name: sum(c * speed[shaft] for shaft, c in contact.slip.items()) for contact in self.creeping}
+        by_memory = self.gear.friction_by_memory(self.memory, motions, normal, creep)
+        rubbing = self.creep_torques(by_memory)
+        outside = {shaft: torque.get(shaft, 0) + rubbing.get(shaft, 0) for shaft in smooth}
+        free = self.inertia.accelerations({shaft: value + outside[shaft] for shaft, value in smooth.items()})
         demand = ca.vertcat(*(sum(c * free[shaft] for shaft, c in contact.slip.items()) for contact in self.contacts))
         compliance = self.compliance()
         static, sliding = self.limits(motions, normal, direction * slip, direction, modes)
@@ -140,7 +156,19 @@ class ContactMechanics:
         answer = self.inertia.accelerations(self.friction_torques(scalar))
         acceleration = {shaft: free[shaft] + answer[shaft] for shaft in self.gear.shafts}
         return ContactForces(
-            motions, normal, twists, passed, slip, static, sliding, compliance, demand, scalar, acceleration
+            motions=motions,
+            normal=normal,
+            twists=twists,
+            passed=passed,
+            slip=slip,
+            static=static,
+            sliding=sliding,
+            compliance=compliance,
+            demand=demand,
+            friction=scalar,
+            smooth=smooth,
+            by_memory=by_memory,
+            acceleration=acceleration,
         )
 
     def compliance(self) -> Matrix:
@@ -155,7 +183,7 @@ class ContactMechanics:
                     matrix[i, k] = -taken
         return matrix
 
-    def rigid_forces(self, forces: ContactForces, angle: Mapping, speed: Mapping, torque: Mapping) -> dict[str, Scalar]:
+    def rigid_forces(self, forces: ContactForces, torque: Mapping) -> dict[str, Scalar]:
         """Normal force [N] of each rigid mesh: what keeps its constraint, with the modes' friction acting.
 
         With R the constraints and J the inertias of the shafts, R J^-1 R^T lambda = R J^-1 torque.
@@ -164,8 +192,9 @@ class ContactMechanics:
         rows = [self.gear.meshes[name].deflection_per_shaft() for name in rigid] + [{s: 1.0} for s in self.gear.fixed]
         if not rigid:
             return {}
-        smooth, stuck = self.gear.torques(speed, forces.normal, forces.passed), self.friction_torques(forces.friction)
-        free = {s: (smooth[s] + stuck[s] + torque.get(s, 0)) / self.masses[s] for s in self.gear.shafts}
+        stuck, rubbing = self.friction_torques(forces.friction), self.creep_torques(forces.by_memory)
+        acting = {s: forces.smooth[s] + stuck[s] + rubbing.get(s, 0) for s in self.gear.shafts}
+        free = {s: (acting[s] + torque.get(s, 0)) / self.masses[s] for s in self.gear.shafts}
         compliance, demand = ca.SX(len(rows), len(rows)), ca.SX(len(rows), 1)
         for i, row in enumerate(rows):
             demand[i] = sum(c * free[s] for s, c in row.items())
@@ -173,6 +202,14 @@ class ContactMechanics:
                 compliance[i, k] = sum(c * other[s] / self.masses[s] for s, c in row.items() if s in other)
         kept = friction(compliance, demand, ca.SX.ones(len(rows)), ca.SX.zeros(len(rows)), redundant=True)
         return {name: kept[k] / ca.cos(self.gear.meshes[name].pair.working_angle) for k, name in enumerate(rigid)}
+
+    def creep_torques(self, by_memory: Mapping[str, tuple[Matrix, list[Matrix]]]) -> dict[str, Scalar]:
+        """Torque [N m] on shafts from the friction laws that do not stick."""
+        torque: dict[str, Scalar] = {}
+        for contact in self.creeping:
+            for shaft, arm in contact.torque.items():
+                torque[shaft] = torque.get(shaft, 0) + arm * by_memory[contact.name][0]
+        return torque
 
     def friction_torques(self, scalar: Matrix) -> dict[str, Scalar]:
         """Torque on each shaft from the friction scalars."""
@@ -221,7 +258,7 @@ class ContactMechanics:
         """How far teeth or coupling are beyond their gap on a side, over a usual size."""
         if path in self.plays:
             return self.plays[path].penetration(twists[path], side) / TWIST_NOMINAL
-        return self.laws[path].penetration(motions[path.removeprefix("meshes.")], side) / DEFLECTION_NOMINAL
+        return self.laws[path].penetration(motions[self.mesh_at[path]], side) / DEFLECTION_NOMINAL
 
     def margins(self, forces: ContactForces, modes: ContactModes) -> Matrix:
         """Margins in the order of `events`.
@@ -244,7 +281,7 @@ class ContactMechanics:
         for path in self.flanks:
             flank = modes.flank[path]
             if path not in self.gapped:
-                name = path.removeprefix("meshes.")
+                name = self.mesh_at[path]
                 usual = self.laws[path].force_scale() * self.gear.meshes[name].count
                 rows.append(flank * forces.normal[name] / usual)
                 continue
@@ -262,7 +299,7 @@ class ContactMechanics:
         for path in self.flanks:
             flank = before[path]
             if path not in self.gapped:
-                force = self.laws[path].force(motions[path.removeprefix("meshes.")], flank)
+                force = self.laws[path].force(motions[self.mesh_at[path]], flank)
                 kept = ca.if_else(ca.fabs(force) > 0, ca.sign(force), 1)
                 turned = ca.if_else(ca.eq(flank, 0), kept, -flank)
                 found.append(ca.if_else(fired[row], turned, kept))

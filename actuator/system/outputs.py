@@ -7,8 +7,10 @@ import casadi as ca
 
 from actuator.system.builder import SystemBuilder
 from actuator.system.contacts import ContactForces, ContactMechanics, ContactModes
+from actuator.system.hybrid import Place
 from controllers.controller import PlantMotion
-from gear.quantities import Scalar
+from gear.quantities import Matrix, Scalar
+from gear.transmission import Contact
 
 
 class Mechanics(NamedTuple):
@@ -22,11 +24,20 @@ class Mechanics(NamedTuple):
     torque: Mapping[str, Scalar]  # from outside, per shaft
 
     def friction_losses(self) -> dict[str, ca.SX]:
-        """Power that each contact takes [W]."""
+        """Power that each contact takes [W]; of a friction law with an internal state, what that stores with it."""
         return {
-            contact.name: -self.forces.friction[k] * sum(arm * self.speed[s] for s, arm in contact.torque.items())
-            for k, contact in enumerate(self.contacts.contacts)
+            contact.name: -friction * sum(arm * self.speed[s] for s, arm in contact.torque.items())
+            for contact, _, friction in self.rubbing()
         }
+
+    def rubbing(self) -> list[tuple[Contact, Matrix, Matrix]]:
+        """Every contact with its slip speed and friction, those that can stick first."""
+        forces, contacts = self.forces, self.contacts
+        found = [(contact, forces.slip[k], forces.friction[k]) for k, contact in enumerate(contacts.contacts)]
+        for contact in contacts.creeping:
+            slip = ca.SX(sum(c * self.speed[shaft] for shaft, c in contact.slip.items()))
+            found.append((contact, slip, ca.SX(forces.by_memory[contact.name][0])))
+        return found
 
     def energy(self) -> ca.SX:
         """Kinetic, and stored in teeth, couplings and stops [J]."""
@@ -37,8 +48,7 @@ class Mechanics(NamedTuple):
     def losses(self) -> dict[str, ca.SX]:
         """Heat [W] of the contacts, and of all that damps without sticking."""
         gear, forces = self.contacts.gear, self.forces
-        smooth = gear.torques(self.speed, forces.normal, forces.passed)
-        taken = -sum(smooth[shaft] * self.speed[shaft] for shaft in gear.shafts)
+        taken = -sum(forces.smooth[shaft] * self.speed[shaft] for shaft in gear.shafts)
         # what the springs take is not lost: the rate of their energy, along the present speeds
         stored = gear.elastic_energy(forces.motions, self.angle, self.modes.flank)
         angles = ca.vertcat(*(ca.SX(self.angle[shaft]) for shaft in self.contacts.kinematics.independent))
@@ -59,13 +69,13 @@ def observe(book: SystemBuilder, seen: Mechanics, motion: PlantMotion) -> None:
     book.output("motor_angle_at_load", "rad", motion.motor_angle / motion.ratio)
     friction: dict[str, ca.SX] = {}
     lost = seen.friction_losses()
-    for k, contact in enumerate(contacts.contacts):
-        unit = ("m/s", "N") if contact.name.startswith("meshes.") else ("rad/s", "N m")
-        book.output(f"gear.{contact.name}.slip_speed", unit[0], forces.slip[k])
-        book.output(f"gear.{contact.name}.friction", unit[1], forces.friction[k])
+    for contact, slip, scalar in seen.rubbing():
+        unit = ("m/s", "N") if contact.place == Place.MESH else ("rad/s", "N m")
+        book.output(f"gear.{contact.name}.slip_speed", unit[0], slip)
+        book.output(f"gear.{contact.name}.friction", unit[1], scalar)
         book.output(f"gear.{contact.name}.friction_loss", "W", lost[contact.name])
-        friction[contact.name] = forces.friction[k]
-    rigid = contacts.rigid_forces(forces, seen.angle, seen.speed, seen.torque)
+        friction[contact.name] = scalar
+    rigid = contacts.rigid_forces(forces, seen.torque)
     for name, normal in {**forces.normal, **rigid}.items():
         mesh, path = gear.meshes[name], f"gear.meshes.{name}"
         book.output(f"{path}.normal_force", "N", normal)

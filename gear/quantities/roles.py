@@ -133,6 +133,13 @@ class ControllerMemory(Role):
 
 
 @dataclass(frozen=True)
+class FrictionMemory(Role):
+    """Internal state of a friction law that does not stick."""
+
+    contact: str
+
+
+@dataclass(frozen=True)
 class Heat(Role):
     """Power that becomes heat, by the loss that it is."""
 

@@ -81,7 +81,7 @@ def efforts_of(demand: Demand, system: HybridSystem) -> list[Effort]:
 
 def inertia_at_motor(plant: Actuator) -> float:
     """Inertia of motor, gear and load that the motor turns [kg m^2]."""
-    turns = {name: float(value) for name, value in plant.gear.travel().items()}
+    turns = {name: float(value) for name, value in plant.gear.speed_ratios().items()}
     own = turns[plant.gear.input]
     total = sum(shaft.inertia * (turns[name] / own) ** 2 for name, shaft in plant.gear.shafts.items())
     return total + plant.motor.rotor_inertia() + plant.load.inertia_at(0.0) * (turns[plant.gear.output] / own) ** 2

@@ -1,26 +1,20 @@
-"""Torsional springs between two shafts or to the housing, with free play or without, and end stops."""
+"""Torsional springs between two shafts or to the housing, with free play or without."""
 
 from dataclasses import dataclass
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 from annotated_types import Ge, Unit
 
+from gear.couplings.law import ShaftCoupling, Twist
 from gear.elasticity.law import pushing
-from gear.quantities import Angle, Scalar, TorsionalDamping, TorsionalStiffness, check, show
+from gear.quantities import Scalar, TorsionalDamping, TorsionalStiffness, check
+from gear.quantities.registry import part
 from gear.quantities.roles import Gap
 
-TWIST_NOMINAL = 1e-4  # rad; couplings under load twist by about this
 
-
-class Twist(NamedTuple):
-    """How far a coupling is turned, and how fast."""
-
-    angle: Scalar  # phi_a - phi_b [rad]
-    rate: Scalar  # its time derivative [rad/s]
-
-
+@part(ShaftCoupling, default=True)
 @dataclass(frozen=True, kw_only=True)
-class Coupling:
+class Coupling(ShaftCoupling):
     """Torsional spring and damper between two shafts: a flexible shaft, mounting or surface, with free play or without.
 
         twist = phi_a - phi_b,   torque on b = T,   on a = -T
@@ -56,6 +50,10 @@ class Coupling:
         if self.a == self.b:
             raise ValueError(f"Coupling needs two different shafts, got {self.a!r} twice")
 
+    def terminals(self) -> dict[str, str]:
+        """Names of shafts, by the field that names them."""
+        return {"a": self.a} if self.b is None else {"a": self.a, "b": self.b}
+
     def twist_per_shaft(self) -> dict[str, float]:
         """Twist [rad] per angle [rad] of each shaft; the torques on the shafts are -T times these."""
         return {self.a: 1.0} if self.b is None else {self.a: 1.0, self.b: -1.0}
@@ -77,54 +75,3 @@ class Coupling:
         if penetration is None:
             return self.stiffness * twist.angle**2 / 2
         return flank**2 * self.stiffness * penetration**2 / 2
-
-
-@dataclass(frozen=True, kw_only=True)
-class EndStop:
-    """What ends the travel of a shaft on both sides: a spring and damper to the housing beyond each of two angles.
-
-        x = angle - upper  (flank +1)   or   lower - angle  (flank -1)     penetration
-        torque on the shaft = -flank * (stiffness x + damping x' limited to +-stiffness x)
-
-    Parameters
-    ----------
-    shaft : str
-        Name of the shaft.
-    lower, upper : float
-        Angles at which the stops are touched [rad], lower < upper.
-    stiffness : float
-        [N m/rad].
-    damping : float
-        [N m s/rad].
-    """
-
-    shaft: str
-    lower: Angle
-    upper: Angle
-    stiffness: TorsionalStiffness
-    damping: TorsionalDamping = 0.0
-
-    def __post_init__(self) -> None:
-        check(self)
-        if self.lower >= self.upper:
-            raise ValueError(
-                f"EndStop on shaft {self.shaft!r} needs lower < upper, got lower={show(self.lower, 'rad')} and "
-                f"upper={show(self.upper, 'rad')}"
-            )
-
-    def twist_per_shaft(self) -> dict[str, float]:
-        """Twist [rad] per angle [rad] of each shaft; the torques on the shafts are -T times these."""
-        return {self.shaft: 1.0}
-
-    def penetration(self, twist: Twist, flank: Scalar) -> Scalar:
-        """How far the shaft is turned beyond the stop of a flank [rad]; half the range below zero for flank 0."""
-        return flank * (twist.angle - (self.upper + self.lower) / 2) - (self.upper - self.lower) / 2
-
-    def torque(self, twist: Twist, flank: Scalar) -> Scalar:
-        """Torque on the housing [N m] at the given stop; zero for flank 0, between the stops."""
-        penetration = self.penetration(twist, flank)
-        return flank * pushing(self.stiffness * penetration, self.damping * flank * twist.rate)
-
-    def stored(self, twist: Twist, flank: Scalar) -> Scalar:
-        """Energy in the spring [J]."""
-        return flank**2 * self.stiffness * self.penetration(twist, flank) ** 2 / 2

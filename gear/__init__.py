@@ -18,6 +18,7 @@ from gear.friction.at_viscosity import AtViscosity as AtViscosity
 from gear.friction.coulomb import Coulomb as Coulomb
 from gear.friction.din3990 import Din3990 as Din3990
 from gear.friction.law import FrictionLaw as FrictionLaw
+from gear.friction.lugre import LuGre as LuGre
 from gear.friction.over_speed import FrictionPoint as FrictionPoint
 from gear.friction.over_speed import FrictionTable as FrictionTable
 from gear.friction.over_speed import Stribeck as Stribeck
@@ -41,6 +42,7 @@ from gear.shafts.bearing import Bearing as Bearing
 from gear.shafts.brake import Brake as Brake
 from gear.shafts.brake import add_brake as add_brake
 from gear.shafts.law import Shaft as Shaft
+from gear.shafts.lugre_bearing import LuGreBearing as LuGreBearing
 from gear.teeth.engagement import Engagement as Engagement
 from gear.teeth.geometry import ExternalPair as ExternalPair
 from gear.teeth.geometry import GivenPair as GivenPair

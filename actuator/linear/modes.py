@@ -16,7 +16,7 @@ from actuator.linear.operating_point import MOTIONS, NoEquilibrium, OperatingPoi
 from actuator.linear.sampled import without_counts
 from actuator.linear.trim import trim
 from actuator.system.contact_modes import FREE, STUCK, contact_labels
-from actuator.system.hybrid import HybridSystem
+from actuator.system.hybrid import HybridSystem, require_sticking
 from gear.quantities import require_known
 
 if TYPE_CHECKING:
@@ -138,6 +138,7 @@ def mode_models(
         Where no mode can be reached at all, with the reason of the first.
     """
     system = without_counts(plant).system() if isinstance(plant, Actuator) else plant
+    require_sticking(system, "mode_models")
     found: list[ModeModel] = []
     reasons: dict[str, NoEquilibrium] = {}
 

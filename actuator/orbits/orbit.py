@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 from actuator.orbits.flow import FlowMap
 from actuator.orbits.segments import Segment
 from actuator.system.contact_modes import contact_labels, find_standstill, label_rows
-from actuator.system.hybrid import HybridSystem
+from actuator.system.hybrid import HybridSystem, require_sticking
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -105,7 +105,8 @@ class Orbit:
 
     @cached_property
     def stick_fraction(self) -> float:
-        """Part of the period in which everything is at rest."""
+        """Part of the period in which everything is at rest; ValueError where a friction law never sticks."""
+        require_sticking(self.system, "the stuck share of an orbit")
         segments = self.segments
         resting = find_standstill(label_rows(self.system, np.array([segment.modes for segment in segments]).T))
         return float(np.array([segment.duration for segment in segments])[resting].sum() / self.period)

@@ -34,7 +34,7 @@ from actuator.simulation.run import ModeChange, Run
 from actuator.simulation.signals import Piece
 from actuator.simulation.simulate import simulate
 from actuator.simulation.window import VIOLATION, ticks_function
-from actuator.system.hybrid import HybridSystem
+from actuator.system.hybrid import HybridSystem, require_sticking
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -164,7 +164,8 @@ class SampledOrbit:
 
     @property
     def stick_fraction(self) -> float:
-        """Part of the period in which every contact is stuck."""
+        """Part of the period in which everything is at rest; ValueError where a friction law never sticks."""
+        require_sticking(self.system, "the stuck share of an orbit")
         return self.run.stuck_share(0.0, self.period)
 
     @property

@@ -43,7 +43,10 @@ def find_return(
                 best = lasted, k
             lasted = 0.0
     if best[1] < 0 or best[1] + 1 >= len(pieces):
-        raise NoOrbit(f"{machine.system.name}: no event in {period:.6g} s; a cycle without any is a linear oscillation")
+        raise NoOrbit(
+            f"{machine.system.name}: no event in {period:.6g} s; a cycle without any is linear, or one with "
+            "friction that never sticks, and is not found here"
+        )
     state = states[best[1]]
     assert state is not None
     return state, pieces[best[1] + 1].modes

@@ -13,7 +13,7 @@ from actuator.simulation.engine import engine
 from actuator.simulation.prepared import EngineOptions
 from actuator.simulation.signals import Piece
 from actuator.system.contact_modes import STUCK, contact_labels, is_at_rest
-from actuator.system.hybrid import EventKind, HybridSystem
+from actuator.system.hybrid import EventKind, HybridSystem, require_sticking
 from gear.quantities.roles import ShaftSpeed
 
 STILL_RATE = 1e-6  # rate of a state over its nominal size [1/s] that does not count as moving
@@ -81,6 +81,7 @@ def predict_breakaway(
         Where a contact slides in this state, or a shaft is held by none.
     """
     system = plant.system() if isinstance(plant, Actuator) else plant
+    require_sticking(system, "predict_breakaway")
     x, u, p = system.state_vector(state), system.input_vector(inputs), system.parameter_values(parameters)
     x, m = engine(system, EngineOptions(compiled=compiled)).settle(0.0, x, np.zeros(len(system.modes)), u, p)
     labels = contact_labels(system, m)

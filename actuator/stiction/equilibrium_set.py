@@ -18,7 +18,7 @@ from actuator.actuator import Actuator
 from actuator.parts.torque_source import TorqueSource
 from actuator.stiction.breakaway import NotAtRest, find_unsupported
 from actuator.system.contact_modes import FREE, STUCK, contact_labels, is_at_rest
-from actuator.system.hybrid import HybridSystem, ModeKind
+from actuator.system.hybrid import HybridSystem, ModeKind, require_sticking
 from gear.quantities.roles import ShaftAngle, ShaftSpeed
 
 SLOPE_ROUNDING = 1e-9  # part of the largest slope of a margin over the torque that is rounding
@@ -97,6 +97,7 @@ def find_equilibrium_set(
         **_no_extras(plant),
     )
     system = bare.system()
+    require_sticking(system, "find_equilibrium_set")
     known = {parameter.name for parameter in system.parameters}
     p = system.parameter_values({name: value for name, value in (parameters or {}).items() if name in known})
     angles = {quantity.name for quantity in system.states if quantity.role(ShaftAngle) is not None}

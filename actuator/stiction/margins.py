@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 from actuator.actuator import Actuator
 from actuator.simulation.run import Run
-from actuator.system.hybrid import HybridSystem
+from actuator.system.hybrid import HybridSystem, require_sticking
 from actuator.system.parameters import Parameter, motion_integrals
 from actuator.system.parameters import at_least_sliding as keep_above_sliding
 from actuator.verdict.verdict import REST, UNDECIDED, Hunting, decide
@@ -160,6 +160,8 @@ def hunting_margin(  # noqa: PLR0913 - what is simulated
     if kind not in list(MarginKind):
         raise ValueError(f"hunting_margin: kind must be one of {', '.join(MarginKind)}, got {kind!r}")
     kind, system = MarginKind(kind), plant.system()
+    if kind == MarginKind.STICTION:
+        require_sticking(system, "the stiction margin")
     values = {q.name: float(q.default) for q in system.parameters} | dict(parameters or {})
     scaled = tuple(parameter for parameter in find_scaled(system, kind) if values[parameter.name] > 0)
     if not scaled:

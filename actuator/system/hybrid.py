@@ -25,7 +25,7 @@ import numpy as np
 
 from actuator.system.parameters import Parameter
 from gear.quantities import require_known, show
-from gear.quantities.roles import Role
+from gear.quantities.roles import FrictionMemory, Role
 
 MARGIN_BAND = 1e-10
 AnyRole = TypeVar("AnyRole", bound=Role)
@@ -267,3 +267,13 @@ class HybridSystem:
         if missing:
             raise KeyError(f"modes {', '.join(missing)} are not given; every contact needs one")
         return np.array([float(values[name]) for name in self.modes])
+
+
+def require_sticking(system: HybridSystem, analysis: str) -> None:
+    """Raise ValueError where an analysis that asks for contact modes meets a friction law that never sticks."""
+    creeping = dict.fromkeys(state.owner for state in system.signals_having(FrictionMemory))
+    if creeping:
+        raise ValueError(
+            f"{analysis} does not apply to {system.name}: it asks which contacts stick, and {' and '.join(creeping)} "
+            "never does; its friction has an internal state instead. Simulate, or use a law that sticks"
+        )

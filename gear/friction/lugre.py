@@ -9,7 +9,7 @@ from annotated_types import Ge, Gt, Unit
 
 from gear.friction.law import FrictionLaw, require_breakaway_above
 from gear.motion import Sliding
-from gear.quantities import Coefficient, Memory, PositiveCoefficient, PositiveMeshSpeed, Scalar, check
+from gear.quantities import Memory, PositiveCoefficient, PositiveMeshSpeed, Scalar, check
 from gear.quantities.registry import part
 from gear.quantities.roles import Breakaway, SlidingFriction
 
@@ -37,8 +37,8 @@ class LuGre(FrictionLaw):
     asks for modes (equilibrium set, breakaway, models per mode) does not apply to it.
 
     In steady motion mu = g(v) + viscous |v|; near rest the bristles are a spring `stiffness` with the damping
-    `damping` + `viscous`. The law takes no energy out of nothing in steady motion, and with this constant damping may for
-    moments where damping > viscous static / (static - sliding) (Barabanov and Ortega).
+    `damping` + `viscous`. The law is passive where damping <= viscous sliding / (static - sliding), as Barabanov and
+    Ortega show; beyond, and so with the published numbers, the bristles may give out energy for moments.
 
     Parameters
     ----------

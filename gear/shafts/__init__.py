@@ -7,3 +7,4 @@ from gear.shafts.drag import Drag as Drag
 from gear.shafts.law import Shaft as Shaft
 from gear.shafts.law import ShaftBearing as ShaftBearing
 from gear.shafts.law import ShaftDrag as ShaftDrag
+from gear.shafts.lugre_bearing import LuGreBearing as LuGreBearing

@@ -11,6 +11,7 @@ from actuator.orbits.sampled import PeriodicOrbit
 from actuator.plots.bode import plot_loops
 from actuator.plots.runs import plot_run
 from actuator.stiction.margins import MOST
+from gear.quantities.roles import FrictionMemory
 from studies.findings import Findings, finite, render, versions
 from studies.judge.study import Insight, Judgment
 
@@ -131,11 +132,12 @@ def _insight(insight: Insight) -> dict[str, Any]:
 
 
 def _orbit(orbit: PeriodicOrbit) -> dict[str, Any]:
+    creeps = orbit.system.signals_having(FrictionMemory)  # then nothing ever sticks
     found = {
         "period_s": orbit.period,
         "amplitude_rad": orbit.load_amplitude,
         "motor_amplitude_rad": orbit.motor_amplitude,
-        "stick_fraction": orbit.stick_fraction,
+        "stick_fraction": None if creeps else orbit.stick_fraction,
         "residual": orbit.residual,
         "stable": orbit.stable,
         "multipliers": [{"real": float(mu.real), "imaginary": float(mu.imag)} for mu in orbit.multipliers],

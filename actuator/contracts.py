@@ -200,10 +200,9 @@ def check_loop_signals(controller: Any) -> None:
 
 def check_gains(controller: Any) -> None:
     """Its gains say what they are: analyses find them by their role."""
-    parameters = actuator_for(controller).system().parameters
+    parameters = parameterize(controller, "controller")[1]
     gains = [each for each in parameters if each.role(LoopGain) is not None or each.role(IntegralGain) is not None]
-    own = [each.name for each in gains if each.name.partition(".")[0] == "controller"]
-    assert own, f"{_name(controller)}: none of its numbers has the role of a gain (gear.quantities.roles)"
+    assert gains, f"{_name(controller)}: none of its numbers has the role of a gain (gear.quantities.roles)"
 
 
 def check_stands_still(controller: Any) -> None:

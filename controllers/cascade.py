@@ -119,7 +119,7 @@ class Cascade(Controller):
 
     position: Annotated[P | PI | None, InLoop("position")]
     speed: Annotated[PI, InLoop("speed")]
-    current: Annotated[PI | None, InLoop("current", "electrical")]
+    current: Annotated[PI | None, InLoop("current", "electrical")] = None
     speed_limit: SpeedLimit
     feedback: Literal["load", "motor"] = "load"
     decoupling: bool = True

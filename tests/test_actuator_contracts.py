@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from annotated_types import Unit
 
-from actuator import PMSM, DCMotor, Load
+from actuator import PMSM, DCMotor, Load, simulate, unpowered
 from actuator.contracts import (
     check_contributions,
     check_demanded_current,
@@ -36,12 +36,14 @@ from actuator.contracts import (
 )
 from actuator.parts.current_source import CurrentSource
 from actuator.parts.load import OutputLoad
-from actuator.parts.motor import Motor
+from actuator.parts.motor import CurrentDriven, Motor
 from actuator.parts.torque_source import TorqueSource
 from controllers import PID, StateFeedback
 from controllers.controller import Controller
 from controllers.countermeasures import Countermeasure
+from gear.quantities import registry
 from gear.quantities.registry import parts
+from studies.cases import load_case
 
 CONTRACTS = {Motor: motor_contract, OutputLoad: load_contract, Controller: controller_contract}
 KEPT = [
@@ -242,3 +244,73 @@ def test_a_contract_is_of_what_is_declared():
     assert check_power_balance not in motor_contract(TorqueSource())
     assert check_demanded_current in motor_contract(CurrentSource.examples()[0])
     assert len(list(controller_contract(replace(StateFeedback.examples()[0], limit=1.0)))) == 8
+
+
+# -- a new motor is one class ---------------------------------------------------------------------------------
+
+STEPPER = """
+title = "A stepper that holds"
+[scenario]
+duration = 0.1
+inputs.reference = { type = "Step", time = 0.0, after = 0.002 }
+[motor]
+type = "Stepper"
+holding_torque = 2.0
+rated_current = 4.0
+inertia = 1e-4
+teeth = 50
+[controller]
+type = "Cascade"
+position = { type = "P", gain = 20 }
+speed = { proportional = 0.05, integral = 0.5 }
+speed_limit = 100
+[gear]
+input = "arm"
+output = "arm"
+shafts.arm.inertia = 1e-3
+"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stepper(CurrentDriven):
+    """Two-phase stepper, commutated by its angle, with the detent torque of its teeth."""
+
+    holding_torque: Annotated[float, Unit("N m")]
+    rated_current: Annotated[float, Unit("A")]
+    inertia: Annotated[float, Unit("kg m^2")]
+    teeth: int
+    detent: Annotated[float, Unit("N m")] = 0.02
+
+    @classmethod
+    def examples(cls):
+        return (cls(holding_torque=2.0, rated_current=4.0, inertia=1e-4, teeth=50),)
+
+    def rotor_inertia(self):
+        return self.inertia
+
+    def has_rotor_torque(self):
+        return True
+
+    def current_for(self, torque):
+        return torque * self.rated_current / self.holding_torque
+
+    def torque(self, currents):
+        return currents[0] * self.holding_torque / self.rated_current
+
+    def shaft_torque(self, currents, angle, speed):
+        return self.torque(currents) - self.detent * ca.sin(4 * self.teeth * angle)
+
+
+def test_a_new_motor_is_one_class_that_registers(monkeypatch, tmp_path):
+    monkeypatch.setattr(registry, "_parts", {slot: dict(kinds) for slot, kinds in registry._parts.items()})
+    registry.part(CurrentDriven)(Stepper)
+    for check in motor_contract(Stepper.examples()[0]):
+        check(Stepper.examples()[0])
+    file = tmp_path / "stepper.toml"
+    file.write_text(STEPPER)
+    case = load_case(file)
+    assert isinstance(case.actuator.motor, Stepper)
+    run = simulate(case.actuator, 4.0, inputs=case.inputs, compiled=False)
+    assert run["load_angle"][-1] == pytest.approx(0.002, abs=1e-4)
+    with pytest.raises(ValueError, match="cogging and drag"):
+        unpowered(case.actuator)

@@ -1,4 +1,4 @@
-"""Cases: an actuator with a scenario to run it through, built in or from a file."""
+"""Cases: an actuator with a scenario, built in or from a file."""
 
 from collections.abc import Mapping
 from dataclasses import Field, dataclass, field, fields, make_dataclass
@@ -16,7 +16,7 @@ from studies.structure import structure
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """An actuator and what it is put through.
+    """An actuator with a scenario.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ class Case:
     title : str
         One line for reports.
     description : str
-        What it is, in a paragraph.
+        A paragraph for reports.
     actuator : Actuator
         What is simulated.
     duration : float

@@ -68,7 +68,7 @@ class Findings:
             aside.mkdir()
             self._write(work)
             names = sorted([RESULT, *(path.name for path in work.iterdir())])
-            result = json.dumps({**finite(self.result), "files": names}, indent=2, allow_nan=False)
+            result = json.dumps({**replace_nonfinite(self.result), "files": names}, indent=2, allow_nan=False)
             (work / RESULT).write_text(result + "\n")
             _exchange(folder, work, aside, sorted(earlier | set(names), key=lambda name: (name == RESULT, name)))
         return [folder / name for name in names]
@@ -149,12 +149,12 @@ def _version(library: str) -> str:
         return "not installed"
 
 
-def finite(value: Any) -> Any:
+def replace_nonfinite(value: Any) -> Any:
     """The same for JSON, with None in place of numbers that are not finite."""
     if isinstance(value, dict):
-        return {key: finite(item) for key, item in value.items()}
+        return {key: replace_nonfinite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [finite(item) for item in value]
+        return [replace_nonfinite(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

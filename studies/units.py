@@ -8,7 +8,7 @@ from gear.quantities import unit_of
 
 
 class Suffix(NamedTuple):
-    """A unit for use in files: how many of it make one SI unit, and where its zero stands in that."""
+    """A unit for use in files: how many of it make one SI unit, and its zero in SI units."""
 
     count: float
     unit: str

@@ -42,17 +42,17 @@ def point(sampling=None):
     return trim(plant, "forward")
 
 
-def closed_form(frequencies):
+def initial_gains(frequencies):
     s = 1j * frequencies
     return (PROPORTIONAL + INTEGRAL / s + DERIVATIVE * s) / (INERTIA * s**2)
 
 
 def test_s_and_t_are_those_of_the_closed_form():
     found = sensitivities(loop_transfer(point(), LOOP))
-    loop = closed_form(found.frequencies)
+    loop = initial_gains(found.frequencies)
     np.testing.assert_allclose(found.sensitivity, abs(1 / (1 + loop)), rtol=1e-6)
     np.testing.assert_allclose(found.complementary, abs(loop / (1 + loop)), rtol=1e-6)
-    fine = closed_form(np.geomspace(1, 100, 1_000_000))
+    fine = initial_gains(np.geomspace(1, 100, 1_000_000))
     assert found.sensitivity_peak.value == pytest.approx(abs(1 / (1 + fine)).max(), rel=1e-7)
     assert found.complementary_peak.value == pytest.approx(abs(fine / (1 + fine)).max(), rel=1e-7)
 

@@ -9,6 +9,7 @@ import math
 import os
 import re
 import shutil
+import sys
 from html.parser import HTMLParser
 
 import pytest
@@ -18,6 +19,7 @@ from click.testing import CliRunner
 from studies import built_in
 from studies.__main__ import COMMANDS, main
 from studies.findings import Findings
+from studies.study import load_commands
 
 MASS = """
 title = "Mass on a guide"
@@ -425,3 +427,71 @@ def test_a_run_that_cannot_be_completed_is_told_in_one_line_and_nothing_is_writt
     assert isinstance(outcome.exception, SystemExit), repr(outcome.exception)
     assert "cannot go on" in outcome.output
     assert list((tmp_path / "out").iterdir()) == []
+
+
+# -- a study of one's own -----------------------------------------------------------------------------------
+
+OWN = '''
+from dataclasses import dataclass
+
+import click
+
+from studies.files import StudyError
+from studies.findings import TEXT, Findings
+from studies.study import Work, study
+
+
+@dataclass(frozen=True, kw_only=True)
+class Square:
+    number: float
+    title: str = "Square"
+
+    def run(self, work: Work) -> Findings:
+        key = f"square of {self.number}"
+        if key not in work.cache:
+            work.cache[key] = {"square": self.number**2}
+        work.part(0.0, 1.0)(1, 1)
+        square = work.cache[key]["square"]
+        return Findings(pictures={}, result={"square": square}, text=[f"{square:g}"], passed=square < 100)
+
+
+@study("square", first=TEXT)
+@click.argument("number", type=float)
+def square(number: float) -> Square:
+    """The square of a number."""
+    if number < 0:
+        raise StudyError(f"NUMBER must be >= 0, got {number:g}")
+    return Square(number=number)
+'''
+
+
+@pytest.fixture
+def square(tmp_path, monkeypatch):
+    """A study in a folder of its own, found by nothing but that."""
+    import studies
+
+    folder = tmp_path / "square"
+    folder.mkdir()
+    (folder / "__init__.py").write_text("")
+    (folder / "commands.py").write_text(OWN)
+    monkeypatch.setattr(studies, "__path__", [*studies.__path__, str(tmp_path)])
+    monkeypatch.setattr(main, "commands", dict(load_commands()))
+    yield
+    COMMANDS.pop("square")
+    for name in ("studies.square", "studies.square.commands"):
+        sys.modules.pop(name)
+
+
+def test_a_study_is_one_folder(square, tmp_path):
+    out = tmp_path / "out"
+    assert "The square of a number." in invoke("--help").output
+    outcome = invoke("--out", out, "square", 3)
+    assert outcome.exit_code == 0, outcome.output
+    assert outcome.output.splitlines()[1] == "9" and "1 results computed" in outcome.output
+    assert json.loads((out / "square" / "result.json").read_text())["square"] == 9
+    again = invoke("--out", out, "square", 3)
+    assert "Resuming: 1 results found" in again.output and "0 results computed" in again.output
+    assert invoke("square", 10, "--out", out).exit_code == 1  # where a check has failed
+    refused = invoke("--out", out, "square", "--", -1)
+    assert refused.exit_code == 2 and refused.output == "Error: NUMBER must be >= 0, got -1\n"
+    assert "--jobs" in invoke("square", "--help").output

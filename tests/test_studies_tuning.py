@@ -31,10 +31,10 @@ from studies.tuning.measures import measures, worst
 from studies.tuning.modes import corner_modes, slide_at_breakaway
 from studies.tuning.plant import (
     NotTunable,
-    closed_form,
-    dead_banded,
-    for_linear_models,
+    add_dead_band,
     inertia_at_motor,
+    initial_gains,
+    prepare_linear,
     with_dead_band,
 )
 from studies.tuning.result import shortfalls
@@ -162,7 +162,7 @@ def test_step_response_and_its_derivatives(one):
 
 def test_every_measure_has_exact_slopes(one):
     gains = dict(zip(GAINS, (20.0, 0.8, 30.0), strict=True))
-    modes = corner_modes(for_linear_models(one), Corner("", {}), 1.5, gains)
+    modes = corner_modes(prepare_linear(one), Corner("", {}), 1.5, gains)
     middle = measures(modes, gains, demand(), {})
     for k, name in enumerate(gains):
         up, down = (
@@ -235,7 +235,7 @@ def test_stiffness_is_the_least_of_all_frequencies(aileron):
 
 
 def test_friction_and_what_a_release_sets_free(one):
-    modes = corner_modes(for_linear_models(one), Corner("", {}), 1.5, {})
+    modes = corner_modes(prepare_linear(one), Corner("", {}), 1.5, {})
     assert modes.friction == pytest.approx(COULOMB, rel=1e-9)
     assert modes.released["forward"] == pytest.approx(1.5 * BREAKAWAY - COULOMB, rel=1e-9)
 
@@ -244,7 +244,7 @@ def test_slip_and_bandwidth_in_closed_form(one):
     # J s^2 + Kp s + Kp g = 0 with poles -a, -b and no integral: a step of torque ends at 1/(Kp g) from below
     gains = {POSITION: 10.0, SPEED: 0.5}
     parameters = {INTEGRAL: 1e-12}
-    modes = corner_modes(for_linear_models(one), Corner("", parameters), 1.5, gains)
+    modes = corner_modes(prepare_linear(one), Corner("", parameters), 1.5, gains)
     found = worst(measures(modes, gains, demand(), {}))
     assert found["slip"].value == pytest.approx((1.5 * BREAKAWAY - COULOMB) / 5.0, rel=1e-6)
     s = 2j * math.pi
@@ -257,7 +257,7 @@ def test_start_in_closed_form(aileron, one):
     assert inertia_at_motor(one) == pytest.approx(INERTIA)
     rotor, pinion, idler, surface = 2e-5, 2e-5, 5e-5 / 5**2, (5e-4 + 0.03) / 35**2
     assert inertia_at_motor(aileron) == pytest.approx(rotor + pinion + idler + surface, rel=1e-9)
-    start = closed_form(one, demand())
+    start = initial_gains(one, demand())
     rate = 2 * math.pi * 1.5
     assert start[POSITION] == pytest.approx(rate)
     assert start[SPEED] == pytest.approx(INERTIA * 5 * rate)
@@ -288,7 +288,7 @@ def positioner():
 
 
 def test_pid_starts_with_three_poles_at_one_rate(positioner):
-    start = closed_form(positioner, demand())
+    start = initial_gains(positioner, demand())
     rate = 2 * math.pi * 1.5
     law = (INERTIA, start[f"{PID_PATH}derivative"], start[f"{PID_PATH}proportional"], start[f"{PID_PATH}integral"])
     assert np.roots(law) == pytest.approx([-rate] * 3, rel=1e-4)
@@ -299,7 +299,7 @@ def test_pid_starts_with_three_poles_at_one_rate(positioner):
 def test_pid_slip_and_effort_in_closed_form(positioner):
     # without an integral a step of torque ends at 1/Kp, from below where Kd > 2 sqrt(J Kp); the first demand is Kp sine
     gains = {f"{PID_PATH}proportional": 4.0, f"{PID_PATH}derivative": 0.5}
-    plant = for_linear_models(positioner)
+    plant = prepare_linear(positioner)
     corner = Corner("", {f"{PID_PATH}integral": 1e-12, f"{PID_PATH}filter_time": 1e-5})
     modes = corner_modes(plant, corner, 1.5, gains)
     task = demand(peak_current=None, peak_torque=1.0)
@@ -320,11 +320,11 @@ def test_a_pid_is_tuned_until_it_does_not_hunt(positioner):
         demand=demand(peak_current=None, peak_torque=3.0, stiction_margin=1.2),
         tuning=Tuning(gains=names, dead_band=True, range=20.0),
     )
-    start = {name: value for name, value in closed_form(positioner, task.demand).items() if name in names}
-    modes = corner_modes(for_linear_models(positioner), Corner("only", {}), 1.2, start)
+    start = {name: value for name, value in initial_gains(positioner, task.demand).items() if name in names}
+    modes = corner_modes(prepare_linear(positioner), Corner("only", {}), 1.2, start)
     found = design([modes], start, task)
     gains = with_dead_band(positioner, found.gains, found.standing_error)
-    plant, corner = dead_banded(positioner), Corner("only", {})
+    plant, corner = add_dead_band(positioner), Corner("only", {})
     ((as_it_was,), (tuned,)) = (check_corners(plant, [corner], g, task.demand, workers=1) for g in ({}, gains))
     assert as_it_was.hunts(1.0)
     assert shortfalls([tuned], task.demand) == {}
@@ -387,7 +387,7 @@ def test_steps_begin_at_rest():
 
 def test_tightened_demands_are_met_by_as_much_more(one):
     start = {POSITION: 10.0, SPEED: 0.3}
-    modes = corner_modes(for_linear_models(one), Corner("only", {INTEGRAL: 1e-12}), 1.5, start)
+    modes = corner_modes(prepare_linear(one), Corner("only", {INTEGRAL: 1e-12}), 1.5, start)
     task = specification(peak_current=2.0)
     plain, tight = (design([modes], start, task, asked) for asked in ({}, {"peak current": 1.25}))
     for found, limit in ((plain, 2.0), (tight, 1.6)):
@@ -475,7 +475,7 @@ def test_the_optimum_lies_where_delay_and_phase_let_it(one):
     # without an integral D = H/(Kp g): the speed loop Kp/(J s) (1 + g/s) is as fast as the delay margin allows
     task = specification(peak_current=1e4, delay_margin=3e-3)
     start = {POSITION: 10.0, SPEED: 0.3}
-    modes = corner_modes(for_linear_models(one), Corner("only", {INTEGRAL: 1e-12}), 1.5, start)
+    modes = corner_modes(prepare_linear(one), Corner("only", {INTEGRAL: 1e-12}), 1.5, start)
     found = design([modes], start, task)
     names = [each.name for each in found.active]
     assert "slip" in names
@@ -486,7 +486,7 @@ def test_the_optimum_lies_where_delay_and_phase_let_it(one):
 
 def test_a_multiplier_is_what_the_demand_costs(one):
     start = {POSITION: 10.0, SPEED: 0.3}
-    modes = corner_modes(for_linear_models(one), Corner("only", {INTEGRAL: 1e-12}), 1.5, start)
+    modes = corner_modes(prepare_linear(one), Corner("only", {INTEGRAL: 1e-12}), 1.5, start)
     # peak current = friction + sine * g * Kp at the first instant: the product of the gains is what it bounds
     limit = 2.0
     found = design([modes], start, specification(peak_current=limit))
@@ -503,7 +503,7 @@ def test_a_multiplier_is_what_the_demand_costs(one):
 
 def test_gains_stay_in_their_range_about_the_start_wherever_the_search_begins(one):
     start = {POSITION: 20.0, SPEED: 0.6}
-    modes = corner_modes(for_linear_models(one), Corner("only", {INTEGRAL: 1e-12}), 1.5, start)
+    modes = corner_modes(prepare_linear(one), Corner("only", {INTEGRAL: 1e-12}), 1.5, start)
     task = replace(specification(peak_current=1e4), tuning=Tuning(gains=(POSITION, SPEED), dead_band=True, range=1.2))
     found = design([modes], start, task)
     again = design([modes], start, task, first=found.gains)
@@ -513,7 +513,7 @@ def test_gains_stay_in_their_range_about_the_start_wherever_the_search_begins(on
 
 def test_demands_that_exclude_each_other(one):
     start = {POSITION: 10.0, SPEED: 0.3}
-    modes = corner_modes(for_linear_models(one), Corner("only", {INTEGRAL: 1e-12}), 1.5, start)
+    modes = corner_modes(prepare_linear(one), Corner("only", {INTEGRAL: 1e-12}), 1.5, start)
     with pytest.raises(NotTunable, match=r"no gains meet all demands at once; nearest: .*standing error"):
         design([modes], start, specification(peak_current=0.3, standing_error=1e-3))
 
@@ -566,11 +566,11 @@ def test_the_dead_band_is_what_ends_the_hunting(tuned):
 def test_dead_band_at_the_motor(aileron):
     ratio = abs(aileron.gear.ratio())
     assert with_dead_band(aileron, {POSITION: 30.0}, 1e-3)[DEAD_BAND] == pytest.approx(ratio * 30.0 * 1e-3)
-    assert dead_banded(aileron).controller.speed.remedies == IntegralRemedies(dead_band=0.0)
+    assert add_dead_band(aileron).controller.speed.remedies == IntegralRemedies(dead_band=0.0)
 
 
 def test_twins_are_corners_that_linear_models_cannot_tell_apart(one):
-    modes = [corner_modes(for_linear_models(one), Corner(name, {}), 1.5, {}) for name in ("a", "b")]
+    modes = [corner_modes(prepare_linear(one), Corner(name, {}), 1.5, {}) for name in ("a", "b")]
     gains = dict(zip(GAINS, (20.0, 0.8, 8.0), strict=True))
     assert find_twins([m for each in modes for m in measures(each, gains, demand(), {})]) == {"a": ["a", "b"]}
 

@@ -24,7 +24,7 @@ from studies.tuning.check import check_corners
 from studies.tuning.loops import curves_at, gain_margin, phase_and_delay_margin
 from studies.tuning.measures import measures
 from studies.tuning.modes import corner_modes
-from studies.tuning.plant import INTEGRAL, POSITION, SPEED, NotTunable, for_linear_models
+from studies.tuning.plant import INTEGRAL, POSITION, SPEED, NotTunable, prepare_linear
 from studies.tuning.study import tune
 
 GAINS = {POSITION: 20.0, SPEED: 0.8, INTEGRAL: 8.0}
@@ -159,7 +159,7 @@ def test_margins_are_those_of_the_closed_poles(plant, gains):
 
 
 def test_every_measure_has_exact_slopes(plant):
-    modes = corner_modes(for_linear_models(plant), Corner("", {}), 1.5, GAINS)
+    modes = corner_modes(prepare_linear(plant), Corner("", {}), 1.5, GAINS)
     task = demand(peak_current=50.0)
     middle = measures(modes, GAINS, task, {})
     assert {"overshoot", "peak current", "slip"} < {m.name for m in middle}
@@ -172,8 +172,8 @@ def test_every_measure_has_exact_slopes(plant):
 def test_counts_are_taken_out_of_the_linear_models():
     counting = servo(sensors=Sensors(load=AngleSensor(resolution=1e-3)))
     corner = Corner("coarse", {"sensors.load.resolution": 2e-3})
-    modes = corner_modes(for_linear_models(counting), corner, 1.5, GAINS)
-    smooth = corner_modes(for_linear_models(servo()), Corner("smooth", {}), 1.5, GAINS)
+    modes = corner_modes(prepare_linear(counting), corner, 1.5, GAINS)
+    smooth = corner_modes(prepare_linear(servo()), Corner("smooth", {}), 1.5, GAINS)
     assert modes.friction == pytest.approx(smooth.friction)
 
 

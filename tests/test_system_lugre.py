@@ -302,9 +302,7 @@ def test_what_has_no_meaning_is_refused(make, message):
 def test_it_hunts_without_ever_sticking():
     run = simulate(held(), 140.0, inputs={"reference": 1.0})
     assert classify(run).verdict == Verdict.LIMIT_CYCLE
-    with pytest.raises(
-        NoOrbit, match="no event in .* a cycle without any is linear, or one with friction"
-    ):
+    with pytest.raises(NoOrbit, match="no event in .* a cycle without any is linear, or one with friction"):
         find_orbit(held(), run)
 
 

@@ -1,1 +1,1 @@
-"""Is it right, and how fast is it: the gear paper, others' numbers, benchmarks."""
+"""Checks of the project itself: the gear paper, published results of other programs, benchmarks."""

@@ -1,14 +1,14 @@
-"""Does this project move an electromechanical actuator as Dymola does: Modelica's ActuatorWithNoise.
+"""Comparison of an electromechanical actuator with Dymola: Modelica's ActuatorWithNoise.
 
 The example Blocks.Examples.Noise.ActuatorWithNoise of the Modelica Standard Library, by A. Kloeckner, F. van der
 Linden, D. Zimmer and M. Otter (DLR), and its published result (Modelica Association, MAP-LIB_ReferenceResults, BSD
-3-clause; Dymola 2020x), here built from this project's parts. Its parts, and what stands for them:
+3-clause; Dymola 2020x), built here from the parts of this project. Its parts and their counterparts:
 
     ideal rotation to translation   rod and load are shafts turned by 300 rad per metre
-    LossyGear, rigid teeth          teeth 10 times as stiff as the free play, friction on the motor's side, which sticks
+    LossyGear, rigid teeth          teeth 10 times as stiff as the free play, friction at the motor, with sticking
     bearing friction of LossyGear   behind the teeth, as there: 0.1 N m at the motor is 1 N m at the wheel
-    noise on the measured angle     the input `motor_angle_error`, a new value every 5 ms: its numbers are this
-                                    project's, since those of Dymola's generator are not published
+    noise on the measured angle     the input `motor_angle_error`, a new value every 5 ms from the generator of this
+                                    project, as the numbers of Dymola are not published
 """
 
 import json
@@ -60,7 +60,7 @@ class Recorded(NamedTuple):
 
 
 def recorded(csv: Path | None = None) -> Recorded:
-    """From the published table, or where none is given the part of it that is stored here."""
+    """Read the published table; by default the excerpt of this package."""
     if csv is None:
         stored = json.loads(DATA.read_text(encoding="utf-8"))
         return Recorded(np.array(stored["time_s"]), np.array(stored["rod_position_m"]))
@@ -79,7 +79,7 @@ def actuator_with_noise() -> Actuator:
             position=PI(proportional=3.0, integral=3.0 / 0.5),
             speed=PI(proportional=SPEED_GAIN, integral=SPEED_GAIN / 0.05),
             current=None,
-            speed_limit=1e4,  # far away: there is none
+            speed_limit=1e4,  # never reached: the example has none
             feedback="motor",
             reference=RateLimit(rate=50.0 / RATIO, time=1e-3),
             speed_from=FilteredDerivative(time=0.01),
@@ -98,7 +98,7 @@ def _gear() -> Transmission:
             "motor": Shaft(inertia=0.29),
             "wheel": Shaft(inertia=WHEEL),
             "rod": Shaft(inertia=3.0 / TURNS**2),
-            "load": Shaft(inertia=1e-9),  # its mass is that of the load
+            "load": Shaft(inertia=1e-9),  # the mass is that of the load
         },
         meshes={
             "gearbox": Mesh(
@@ -131,7 +131,7 @@ def noise(seed: int = 0) -> Staircase:
 
 
 def move(plant: Actuator, error: Staircase | None = None, progress: Callable[[float], None] | None = None) -> Run:
-    """The example's 8 s; its controller starts at rest with the first measured angle."""
+    """Simulate the 8 s of the example; the controller starts at rest with the first measured angle."""
     step = {"reference": Step(time=0.5, after=COMMAND / RATIO)}
     if error is None:
         return simulate(plant, DURATION, inputs=step, resolution=RESOLUTION, progress=progress)
@@ -145,27 +145,27 @@ def move(plant: Actuator, error: Staircase | None = None, progress: Callable[[fl
 
 
 def rod(run: Run) -> np.ndarray:
-    """Position of the rod [m]; the load is a spring away from it."""
+    """Position of the rod [m], in front of the spring to the load."""
     return run["rod.angle"] / TURNS
 
 
 class ActuatorCheck(NamedTuple):
-    """Runs without and with noise beside Dymola's."""
+    """Runs without and with noise, with the published run."""
 
     theirs: Recorded
     clean: Run
     noisy: Run
 
     def deviation(self) -> np.ndarray:
-        """Without noise, less theirs, at their outputs [m]."""
+        """Deviation without noise from the published position, at its output points [m]."""
         return np.interp(self.theirs.time, self.clean.t, rod(self.clean)) - self.theirs.position
 
     def moved(self) -> np.ndarray:
-        """What the noise moves [m], at the points of the run with noise."""
+        """Effect of the noise on the position [m], at the points of the run with noise."""
         return rod(self.noisy) - np.interp(self.noisy.t, self.clean.t, rod(self.clean))
 
     def rows(self) -> list[Deviation]:
-        """The table."""
+        """Rows of the table."""
         count = len(self.theirs.time)
         return [
             Deviation(
@@ -178,7 +178,7 @@ class ActuatorCheck(NamedTuple):
         ]
 
     def picture(self) -> Figure:
-        """Both positions, and what lies between them."""
+        """Both positions, and their deviations."""
         figure = Figure(figsize=(9, 6), layout="constrained")
         above, below = figure.subplots(2, 1, sharex=True)
         above.plot(self.clean.t, 1e3 * rod(self.clean), color=COLORS[1], label="here, without noise")
@@ -192,7 +192,7 @@ class ActuatorCheck(NamedTuple):
             self.theirs.time, 1e6 * self.deviation(), ".", color=COLORS[0], markersize=4, label="here less Dymola"
         )
         for side in (-1, 1):
-            label = f"allowed: {100 * ALLOWED:g} % of {1e3 * TRAVEL:.4g} mm" if side > 0 else None
+            label = f"limit: {100 * ALLOWED:g} % of {1e3 * TRAVEL:.4g} mm" if side > 0 else None
             below.axhline(side * 1e6 * ALLOWED * TRAVEL, color=COLORS[0], linestyle="--", lw=0.8, label=label)
         below.set_ylabel("deviation in um")
         below.set_xlabel("time in s")

@@ -1,15 +1,15 @@
-"""Does this project move a 2.2 kW PMSM drive as motulator does, machine and control.
+"""Comparison of a 2.2 kW PMSM drive, machine and control, with motulator.
 
 The published example "2.2-kW interior PMSM, current-vector control" of motulator 0.18.0 (MIT licence), with measured
 rotor position, a stiff link of 540 V and an averaged inverter: 1500 rpm from 0.2 s on, 14 N m from 0.6 s on.
 
-Machine: this project's laws of motor and inverter get the recorded duty ratios and load torque. Those of sample k act
-from k + 1 to k + 2, as the drive computes for one period.
+Machine: the motor and inverter of this project are driven by the recorded duty ratios and load torque. Those of
+sample k act from k + 1 to k + 2, as the drive has a computation delay of one period.
 
-Drive: this project's own sampled cascade, of the same bandwidths, limits and delay. What it does otherwise: it filters
-its torque demand and then limits it, where the other lets its limited current reference follow with that bandwidth, so
-it is faster for a moment where the limit is met; and one current law for both axes cancels the pole of the winding,
-where the other has one on flux linkages with two degrees of freedom.
+Drive: the sampled cascade of this project, with the same bandwidths, limits and delay. Differences: it filters its
+torque reference and then limits it, while motulator filters the limited current reference, so it is briefly faster
+where the limit is reached; and one current law for both axes cancels the pole of the winding, while motulator controls
+flux linkages with two degrees of freedom.
 """
 
 import math
@@ -33,12 +33,12 @@ from studies.checks.cross_check_record import (
     SPEED_TIME,
     Excerpt,
     Recorded,
-    marks,
+    key_figures,
 )
 from studies.checks.deviation import Deviation
 
-INERTIA = 0.015  # kg m^2, of all that turns
-COUPLING = 1e-4  # kg m^2, the part of it that stands for the gear's only shaft
+INERTIA = 0.015  # kg m^2, in total
+COUPLING = 1e-4  # kg m^2, the part of it assigned to the only shaft of the gear
 MOTOR = PMSM(
     pole_pairs=3,
     resistance=3.6,
@@ -52,8 +52,8 @@ DURATION = 1.2  # s
 CURRENT_BANDWIDTH, REFERENCE_BANDWIDTH, SPEED_BANDWIDTH, OBSERVER_BANDWIDTH = (
     2 * math.pi * hertz for hertz in (200.0, 100.0, 4.0, 400.0)
 )
-STEPS = 2  # of Runge and Kutta in a period; twice as many change the currents by less than 1e-7 of their peaks
-MACHINE_ALLOWED, DRIVE_ALLOWED = 1e-3, 3e-2  # of the peaks, of the marks
+STEPS = 2  # Runge-Kutta steps per period; twice as many change the currents by less than 1e-7 of their peaks
+MACHINE_ALLOWED, DRIVE_ALLOWED = 1e-3, 3e-2  # of the peaks, of the key figures
 COLORS = ("#4d4d4d", "#3b75af", "#e1812c", "#5a8f3c")
 
 
@@ -125,7 +125,7 @@ def drive() -> Actuator:
 
 
 def move() -> Run:
-    """The example's 1.2 s."""
+    """Simulate the 1.2 s of the example."""
     inputs = {
         "speed_reference": Step(time=SPEED_TIME, after=SPEED),
         "load_torque": Step(time=LOAD_TIME, after=-LOAD),
@@ -134,7 +134,7 @@ def move() -> Run:
 
 
 def signals_of(run: Run) -> dict[str, np.ndarray]:
-    """By the names of SIGNALS."""
+    """Signals of a run by the names of SIGNALS."""
     names = ("motor.current_d", "motor.current_q", "motor_torque", "motor_speed")
     return {name: run[signal] for name, signal in zip(SIGNALS, names, strict=True)}
 
@@ -143,14 +143,14 @@ def signals_of(run: Run) -> dict[str, np.ndarray]:
 
 
 class DriveCheck(NamedTuple):
-    """The machine on recorded voltages, and the drive, beside the other's."""
+    """The machine on recorded voltages, and the drive, with the published run."""
 
     theirs: Recorded
     machine: list[dict[str, np.ndarray]]  # per excerpt
     run: Run
 
     def rows(self) -> list[Deviation]:
-        """The table."""
+        """Rows of the table."""
         machine = [
             Deviation(
                 what=f"machine on recorded voltages: {name}, {self._count()} samples",
@@ -161,7 +161,7 @@ class DriveCheck(NamedTuple):
             )
             for name, unit in SIGNALS.items()
         ]
-        ours = marks(self.run.t, signals_of(self.run))
+        ours = key_figures(self.run.t, signals_of(self.run))
         return machine + [
             Deviation(
                 what=f"drive: {name}",
@@ -170,7 +170,7 @@ class DriveCheck(NamedTuple):
                 deviation=ours[name] - value,
                 allowed=DRIVE_ALLOWED,
             )
-            for name, value in self.theirs.marks.items()
+            for name, value in self.theirs.key_figures.items()
         ]
 
     def _count(self) -> int:
@@ -182,7 +182,7 @@ class DriveCheck(NamedTuple):
         ]
 
     def machine_picture(self) -> Figure:
-        """Per excerpt the signals over their peaks, and the deviations."""
+        """Signals over their peaks and their deviations, per excerpt."""
         excerpts = self.theirs.excerpts
         figure = Figure(figsize=(9, 6), layout="constrained")
         panels = figure.subplots(2, len(excerpts), sharex="col", sharey="row", squeeze=False)
@@ -202,13 +202,13 @@ class DriveCheck(NamedTuple):
             for axes in (above, below):
                 axes.grid(alpha=0.3)
         panels[0, 0].set_ylabel("signal over its peak")
-        panels[1, 0].set_ylabel(f"deviation in 1e-6\nof the peak ({1e6 * MACHINE_ALLOWED:g} allowed)")
+        panels[1, 0].set_ylabel(f"deviation in 1e-6\nof the peak (limit {1e6 * MACHINE_ALLOWED:g})")
         panels[0, -1].legend(title="peaks (circles: motulator)", fontsize="small", title_fontsize="small")
         panels[1, 0].legend(fontsize="small")
         return figure
 
     def drive_picture(self) -> Figure:
-        """Speed, torque and currents of both drives, and what lies between them."""
+        """Speed, torque and currents of both drives, and their deviations."""
         ours, theirs = signals_of(self.run), self.theirs
         figure = Figure(figsize=(9, 7.5), layout="constrained")
         speed, torque, current, error = figure.subplots(4, 1, sharex=True)

@@ -36,12 +36,12 @@ class Recorded(NamedTuple):
 
     excerpts: list[Excerpt]
     peaks: dict[str, float]  # of the whole run, by the names of SIGNALS
-    marks: dict[str, float]
+    key_figures: dict[str, float]
     time: np.ndarray  # (n,) of the curves [s]
     curves: dict[str, np.ndarray]
 
 
-def marks(time: np.ndarray, signals: dict[str, np.ndarray]) -> dict[str, float]:
+def key_figures(time: np.ndarray, signals: dict[str, np.ndarray]) -> dict[str, float]:
     """Key figures of a drive: peak current, speed dip after the load step, settled currents."""
     size = np.hypot(signals["current_d"], signals["current_q"])
     return {
@@ -73,7 +73,7 @@ def recorded(npz: Path | None = None) -> Recorded:
             begin=0.0,
         )
     peaks = {name: float(np.abs(values).max()) for name, values in signals.items()}
-    return Recorded([whole], peaks, marks(time, signals), time, signals)
+    return Recorded([whole], peaks, key_figures(time, signals), time, signals)
 
 
 def require_columns(path: Path, needed: Sequence[str], there: Sequence[str]) -> None:

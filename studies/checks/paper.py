@@ -1,4 +1,4 @@
-"""Cases for the benchmarks: figure 9 of the gear paper, the preloaded gear that sticks and slips, and a compound set.
+"""Cases of the gear paper: figure 9, a preloaded gear with stick-slip; and a compound planetary set for benchmarks.
 
 F. L. J. van der Linden, "Modeling of geared positioning systems: an object oriented gear contact model with
 validation", Tables 3 and 4. The paper gives neither load spring nor damper; 1000 N m/rad and 2 N m s/rad

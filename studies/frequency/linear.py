@@ -59,7 +59,7 @@ class LinearPart:
     missing: Mapping[str, str]
 
 
-def linear_part(actuator: Actuator, inputs: Mapping[str, float]) -> LinearPart:
+def linearize_case(actuator: Actuator, inputs: Mapping[str, float]) -> LinearPart:
     """Linearize in every mode at an operating point.
 
     Raises
@@ -96,7 +96,7 @@ def _margins(loop: control.StateSpace) -> Margins | LiftedMargins:
     return margins(loop) if loop.ninputs == 1 else lifted_margins(loop)
 
 
-def closed_at(
+def closed_loop_at(
     actuator: Actuator, inputs: Mapping[str, float], sets: Mapping[str, Mapping[str, float]], place: Place
 ) -> dict[str, control.StateSpace]:
     """Load angle over reference by mode, all loops closed, in a corner with a bias load.

@@ -71,7 +71,7 @@ def _shown(
             for place, checks in study.checks.items()
             for check in checks
         ],
-        "where": f"{first.capitalize()}. " if (first := study.label(next(iter(study.checks)))) else "",
+        "where": f"{first[0].upper()}{first[1:]}. " if (first := study.label(next(iter(study.checks)))) else "",
         "point": ", ".join(f"{name} {value:.4g}" for name, value in {"reference": 0.0, **study.inputs}.items()),
         "corners": _corners(study),
         "pictures": pictures,

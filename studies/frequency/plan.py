@@ -14,7 +14,7 @@ from studies.files import StudyError, built_in_files, locate, read
 from studies.frequency.bench import TESTS
 from studies.frequency.mask import Mask
 from studies.specification import Specification, built_in_specifications, load_specification
-from studies.tuning.plant import dead_banded
+from studies.tuning.plant import add_dead_band
 from studies.tuning.result import read_tuned_gains
 
 PARTS = (0.1, 0.2, 0.4)  # of the largest torque, in the sines of torque on the load
@@ -216,7 +216,7 @@ def load_second(name: str, first: Case) -> Case:
         return other
     label = f"{first.name}-tuned"
     try:
-        plant = dead_banded(first.actuator)
+        plant = add_dead_band(first.actuator)
         gains = read_tuned_gains(Path(name), plant)
         controller = with_values(plant.controller, "controller", gains.values)
     except StudyError:

@@ -26,7 +26,7 @@ from studies.cache import fingerprint
 from studies.cases import Case
 from studies.files import StudyError
 from studies.frequency.bench import CORNERS, TESTS, BenchPlan, BenchWork
-from studies.frequency.linear import OUTPUT, LinearPart, closed_at, linear_part
+from studies.frequency.linear import OUTPUT, LinearPart, closed_loop_at, linearize_case
 from studies.frequency.mask import LimitCheck, check_limit
 from studies.frequency.plan import PARTS, Place, Plan
 from studies.study import Work
@@ -134,14 +134,14 @@ def measure_case(case: Case, plan: Plan, work: Work) -> CaseResponse:
     inputs = {n: piece_at(s, case.duration)(0.0) for n, s in case.inputs.items() if n != "reference"}
     missing: dict[str, str] = {}
     try:
-        linear = linear_part(actuator, inputs)
+        linear = linearize_case(actuator, inputs)
     except NoEquilibrium as error:
         raise StudyError(f"{case.name}: no operating point: {error}") from None
     first, *others = plan.places(actuator)
     closed = {first: linear.closed}
     for place in others:
         try:
-            closed[place] = closed_at(actuator, inputs, sets, place)
+            closed[place] = closed_loop_at(actuator, inputs, sets, place)
         except NoEquilibrium as error:
             missing[f"linear models, {place.corner}, bias {place.bias:+g} N m"] = str(error)
     simulated = _Simulations(actuator, inputs, work, plan.points(actuator))

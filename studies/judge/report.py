@@ -12,7 +12,7 @@ from actuator.plots.bode import plot_loops
 from actuator.plots.runs import plot_run
 from actuator.stiction.margins import MOST
 from gear.quantities.roles import FrictionMemory
-from studies.findings import Findings, finite, render, versions
+from studies.findings import Findings, render, replace_nonfinite, versions
 from studies.judge.study import Insight, Judgment
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def figures(judgment: Judgment) -> "dict[str, Figure]":
 def result_of(judgment: Judgment) -> dict[str, Any]:
     """Everything that is a number, for machines; null where there is none (no cycle, no crossing)."""
     case, run = judgment.case, judgment.run
-    return finite(
+    return replace_nonfinite(
         {
             "case": case.name,
             "title": case.title,

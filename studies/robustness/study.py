@@ -23,7 +23,7 @@ from studies.robustness.robustness import CONFIDENCE, Probability, Robustness, r
 from studies.specification import Demand, Specification
 from studies.study import Work
 from studies.tuning.check import SINE, STEP, Bench, Trial
-from studies.tuning.plant import dead_banded, defaults_of
+from studies.tuning.plant import add_dead_band, defaults_of
 from studies.tuning.result import read_tuned_gains
 
 STEPS = (0.1, 1.0)  # of the demanded amplitude
@@ -106,7 +106,7 @@ class RobustnessStudy:
     def run(self, work: Work) -> Findings:
         """Run the sample and write the report."""
         specification, case, tolerances = self.specification, self.case, self.specification.tolerances
-        plant = dead_banded(case.actuator)
+        plant = add_dead_band(case.actuator)
         parameters = plant.system().parameters
         where = find_corner_named(specification, case.actuator, self.corner)
         tuned = read_tuned_gains(self.gains, plant) if self.gains else None

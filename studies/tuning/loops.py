@@ -1,4 +1,4 @@
-"""Linear models for tuning, in continuous time or sampled: one way to ask both for loops and responses."""
+"""Loops and responses for tuning, in continuous time or sampled, and margins with their derivatives by the gains."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -16,7 +16,7 @@ from actuator.system.builder import PREFIX
 from studies.tuning.plant import loops_of
 
 FREQUENCIES = 2 * np.pi * np.logspace(-1.5, 3.5, 240)  # rad/s
-NYQUIST = 1 - 1e-3  # part of half a rate up to which what is sampled is looked at
+NYQUIST = 1 - 1e-3  # part of the Nyquist frequency, the end of the grid of a sampled loop
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +26,7 @@ class Curves:
     Attributes
     ----------
     model : GainModel or SampledGainModel
-        With all derivatives.
+        With its derivatives by the gains.
     """
 
     model: GainModel | SampledGainModel = field(repr=False)
@@ -37,12 +37,12 @@ class Curves:
         return isinstance(self.model, SampledGainModel)
 
     def frequencies(self, at: str | None = None) -> np.ndarray:
-        """The grid [rad/s]: of sampled control up to half the rate of a signal, or of all of them together."""
+        """The grid [rad/s]: with a sampled controller up to the Nyquist frequency of a signal, or of all signals."""
         end = self.model.highest(at) * NYQUIST if isinstance(self.model, SampledGainModel) else math.inf
         return FREQUENCIES if end > FREQUENCIES[-1] else np.append(FREQUENCIES[end > FREQUENCIES], end)
 
     def loop(self, at: str) -> np.ndarray:
-        """Loop transfer, opened at a signal, on its grid."""
+        """Loop transfer on its grid, opened at a signal."""
         if isinstance(self.model, SampledGainModel):
             return self.model.loops(at, self.frequencies(at))
         closed = self.response(PREFIX + at, at)
@@ -55,7 +55,7 @@ class Curves:
         return self._table[:, self.model.seen.index(seen), self.model.given.index(given)]
 
     def spacing(self, step: float) -> float:
-        """The step of time next to this one at which there is a step response [s]."""
+        """The time step [s] next to this one for which there is a step response."""
         return self.model.spacing(step) if isinstance(self.model, SampledGainModel) else step
 
     @cached_property
@@ -75,66 +75,68 @@ def curves_at(point: OperatingPoint, gains: Mapping[str, float], resting: Operat
     return Curves(make(point, tuple(gains), inputs, outputs, resting=resting))
 
 
-NONE = math.log(100.0)  # |ln| of a gain margin where there is no crossing
-NOTHING = 1e-6  # loop gain below which nothing passes
-NEWTON = 30  # steps; where one leaves its interval, that is halved instead
-MISSED = 1e-6  # what a crossing may be missed by: one that is not there is a jump between loci
+# -- margins ----------------------------------------------------------------------------------------------
+
+NO_CROSSING = math.log(100.0)  # |ln| of a gain margin without a crossing
+ZERO_GAIN = 1e-6  # a smaller loop gain is zero
+NEWTON_STEPS = 30  # where one leaves its interval, that is bisected instead
+CROSSING_ERROR = 1e-6  # a larger one is a jump between loci, not a crossing
 
 
-class Room(NamedTuple):
-    """How far from instability a loop is in one respect; with the derivatives by the gains."""
+class Distance(NamedTuple):
+    """Distance of a loop from instability in one respect, with its derivatives by the gains."""
 
     size: float
     slopes: np.ndarray
 
 
-def gain_margin(curves: Curves, at: str) -> Room:
-    """|ln| of the factor on the gain, up or down, that makes the loop unstable, the nearest."""
+def gain_margin(curves: Curves, at: str) -> Distance:
+    """|ln| of the nearest factor on the gain, up or down, that makes the loop unstable."""
     frequencies, values = curves.frequencies(at), curves.loop(at)
-    best = Room(NONE, np.zeros(len(curves.model.gains)))
-    crosses = (np.imag(values[:-1]) * np.imag(values[1:]) < 0) & (np.real(values[:-1]) < -NOTHING)
-    found = [_refined(curves, at, frequencies[k : k + 2], _real)[1] for k in np.flatnonzero(crosses).tolist()]
-    crossings = [(each, False) for each in found if abs(_real(each)[0]) < MISSED * abs(each.value[0])]
-    if curves.sampled:  # the loop is real at half the rate of its signal, and mirrored beyond
+    best = Distance(NO_CROSSING, np.zeros(len(curves.model.gains)))
+    crosses = (np.imag(values[:-1]) * np.imag(values[1:]) < 0) & (np.real(values[:-1]) < -ZERO_GAIN)
+    found = [_refine(curves, at, frequencies[k : k + 2], _real)[1] for k in np.flatnonzero(crosses).tolist()]
+    crossings = [(each, False) for each in found if abs(_real(each)[0]) < CROSSING_ERROR * abs(each.value[0])]
+    if curves.sampled:  # the loop is real at the Nyquist frequency of its signal, and mirrored beyond
         crossings.append((curves.model.loop(at, [frequencies[-1]]), True))
     for response, fixed in crossings:
         level = np.real(response.value[0])
-        if level > -NOTHING:
+        if level > -ZERO_GAIN:
             continue
         along = 0.0 if fixed else np.imag(response.slopes[0]) / np.imag(response.by_frequency[0])
         slopes = (np.real(response.slopes[0]) - np.real(response.by_frequency[0]) * along) / level
         size = math.log(-level)
         if abs(size) < best.size:
-            best = Room(abs(size), math.copysign(1.0, size) * slopes)
+            best = Distance(abs(size), math.copysign(1.0, size) * slopes)
     return best
 
 
-def phase_and_delay_margin(curves: Curves, at: str) -> tuple[Room, Room]:
+def phase_and_delay_margin(curves: Curves, at: str) -> tuple[Distance, Distance]:
     """The smallest lag or lead [rad], and the smallest delay [s], that make the loop unstable.
 
-    Both are negative where it is unstable: then by how much it is, of the crossing that is nearest. Without a crossing
-    the phase is pi, and the delay infinite; of an unstable loop zero, as no delay makes it stable.
+    Both are negative for an unstable loop, at the nearest crossing. Without a crossing the phase is pi and the delay
+    infinite; for an unstable loop the delay is zero, as no delay makes it stable.
     """
     frequencies, values, stable = curves.frequencies(at), curves.loop(at), curves.model.stable
     sign, none = (1.0 if stable else -1.0), np.zeros(len(curves.model.gains))
-    phase, delay = Room(sign * math.pi, none), Room(math.inf if stable else -math.inf, none)
+    phase, delay = Distance(sign * math.pi, none), Distance(math.inf if stable else -math.inf, none)
     for k in np.flatnonzero((abs(values[:-1]) - 1) * (abs(values[1:]) - 1) < 0).tolist():
-        w, found = _refined(curves, at, frequencies[k : k + 2], _unity)
+        w, found = _refine(curves, at, frequencies[k : k + 2], _unity)
         value = found.value[0]
-        if abs(abs(value) - 1) > MISSED:
+        if abs(abs(value) - 1) > CROSSING_ERROR:
             continue
         lag = (math.pi + float(np.angle(value)) + math.pi) % (2 * math.pi) - math.pi
         change, by_frequency = found.slopes[0] / value, found.by_frequency[0] / value
         shift = -np.real(change) / np.real(by_frequency)  # of the crossing
         slopes = np.imag(change) + np.imag(by_frequency) * shift
         if abs(lag) < abs(phase.size):
-            phase = Room(sign * abs(lag), sign * math.copysign(1.0, lag) * slopes)
-        # a delay only ever lags: where a lead is nearest, it takes the rest of the turn
+            phase = Distance(sign * abs(lag), sign * math.copysign(1.0, lag) * slopes)
+        # a delay only lags: where a lead is nearest, it takes the rest of the turn
         later = lag % (2 * math.pi) if stable else -abs(lag)
         turn = slopes if stable else -math.copysign(1.0, lag) * slopes
         if abs(later / w) < abs(delay.size):
-            delay = Room(later / w, (turn - later / w * shift) / w)
-    return phase, delay if math.isfinite(delay.size) or stable else Room(0.0, none)
+            delay = Distance(later / w, (turn - later / w * shift) / w)
+    return phase, delay if math.isfinite(delay.size) or stable else Distance(0.0, none)
 
 
 def _real(response: Response) -> tuple[float, float]:
@@ -146,14 +148,14 @@ def _unity(response: Response) -> tuple[float, float]:
     return abs(value) - 1, np.real(response.by_frequency[0] * value.conj()) / abs(value)
 
 
-def _refined(
+def _refine(
     curves: Curves, at: str, interval: np.ndarray, crossing: Callable[[Response], tuple[float, float]]
 ) -> tuple[float, Response]:
-    """Where a function of the loop crosses zero in an interval, and the loop there, by Newton's method."""
+    """The frequency in an interval where a function of the loop crosses zero, and the loop there (Newton's method)."""
     low, high = map(float, interval)
     start = crossing(curves.model.loop(at, [low]))[0]
     w = math.sqrt(low * high)
-    for _ in range(NEWTON):
+    for _ in range(NEWTON_STEPS):
         value, slope = crossing(curves.model.loop(at, [w]))
         low, high = (w, high) if value * start > 0 else (low, w)
         after = w - value / slope if slope else w

@@ -48,7 +48,7 @@ def corner_modes(plant: Actuator, corner: Corner, stiction: float, start: Mappin
     Parameters
     ----------
     plant : Actuator
-        As `for_linear_models` makes it.
+        As `prepare_linear` makes it.
     corner : Corner
         Its parameters.
     stiction : float

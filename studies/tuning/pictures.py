@@ -13,7 +13,7 @@ from studies.tuning.check import BEFORE
 from studies.tuning.loops import curves_at
 from studies.tuning.measures import worst
 from studies.tuning.modes import corner_modes, move_point
-from studies.tuning.plant import for_linear_models, loops_of
+from studies.tuning.plant import loops_of, prepare_linear
 from studies.tuning.result import Tuned
 from studies.tuning.stiction import MOST
 from studies.tuning.stiction import STEP as RUNG
@@ -61,7 +61,7 @@ def steps_picture(tuned: Tuned) -> Figure:
 
 def loops_picture(tuned: Tuned) -> Figure:
     """Loops in the corners that decide and both sliding directions, before and after."""
-    linear = for_linear_models(tuned.original)
+    linear = prepare_linear(tuned.original)
     figure = Figure(figsize=(9, 5.5), layout="constrained")
     opened = loops_of(linear.system())
     panels = bode_panels(figure, len(opened))

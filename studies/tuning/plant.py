@@ -1,4 +1,4 @@
-"""What is tuned: the gains of a cascade or of a PID, their start in closed form, and the dead band of the integral."""
+"""What is tuned: gains that a controller declares, their start in closed form, the dead band of its integral."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 from actuator.actuator import Actuator
 from actuator.linear.sampled import without_counts
-from actuator.system.builder import PREFIX
 from actuator.system.hybrid import HybridSystem
 from actuator.system.parameters import Parameter, with_values
 from controllers.controller import Controller, integrating_law, prefix_of_integral
 from controllers.countermeasures import with_integral
 from controllers.integral import IntegralRemedies
+from gear.quantities.roles import LoopSignal
 from studies.files import StudyError
 from studies.specification import Criterion, Demand
 
@@ -21,7 +21,7 @@ ROOM = 1.5  # bandwidth of the position loop at the start, over the demanded one
 
 
 class NotTunable(StudyError):
-    """No gains meet the demands, or the actuator is not one that can be tuned here."""
+    """No gains meet the demands, or the actuator cannot be tuned here."""
 
 
 class Effort(NamedTuple):
@@ -34,10 +34,10 @@ class Effort(NamedTuple):
 
 
 def tunable(plant: Actuator) -> Controller:
-    """The controller of an actuator; NotTunable with the reason where it is not one that can be tuned here."""
+    """The controller of an actuator; NotTunable with the reason where it cannot be tuned."""
     controller = plant.controller
     if controller is None:
-        raise NotTunable(f"{plant.name}: tuning takes the gains of a controller, and there is none")
+        raise NotTunable(f"{plant.name}: tuning needs a controller, and there is none")
     try:
         controller.tunable_gains()
     except ValueError as error:
@@ -56,18 +56,18 @@ def dead_band_of(plant: Actuator) -> str:
 
 
 def loops_of(system: HybridSystem) -> tuple[str, str]:
-    """Signals at which margins are demanded: of the outer loop, and the torque that all of them ask for."""
-    inputs = [quantity.name for quantity in system.inputs]
-    return ("speed_reference" if f"{PREFIX}speed_reference" in inputs else "position", "torque_reference")
+    """Signals at which margins are demanded: of the outer loop, and the torque reference."""
+    signals = [role.signal for quantity in system.inputs if (role := quantity.role(LoopSignal))]
+    return ("speed_reference" if "speed_reference" in signals else "position", "torque_reference")
 
 
 def efforts_of(demand: Demand, system: HybridSystem) -> list[Effort]:
-    """What is demanded of current and torque in a step.
+    """Demands on current and torque in a step.
 
     Raises
     ------
     NotTunable
-        For the current of a motor that has none.
+        For a current demand on a motor without current.
     """
     found = []
     if demand.peak_current is not None:
@@ -80,15 +80,15 @@ def efforts_of(demand: Demand, system: HybridSystem) -> list[Effort]:
 
 
 def inertia_at_motor(plant: Actuator) -> float:
-    """Inertia of motor, gear and load that the motor turns [kg m^2]."""
+    """Inertia of motor, gear and load at the motor [kg m^2]."""
     turns = {name: float(value) for name, value in plant.gear.speed_ratios().items()}
     own = turns[plant.gear.input]
     total = sum(shaft.inertia * (turns[name] / own) ** 2 for name, shaft in plant.gear.shafts.items())
     return total + plant.motor.rotor_inertia() + plant.load.inertia_at(0.0) * (turns[plant.gear.output] / own) ** 2
 
 
-def closed_form(plant: Actuator, demand: Demand) -> dict[str, float]:
-    """Gains by loop shaping on the inertia that the motor turns."""
+def initial_gains(plant: Actuator, demand: Demand) -> dict[str, float]:
+    """Gains by loop shaping on the inertia at the motor."""
     bandwidth, inertia = 2 * math.pi * demand.bandwidth * ROOM, inertia_at_motor(plant)
     found = tunable(plant).gains_for_bandwidth(bandwidth, inertia, plant.gear.ratio())
     return {f"{OWNER}{name}": value for name, value in found.items()}
@@ -97,8 +97,8 @@ def closed_form(plant: Actuator, demand: Demand) -> dict[str, float]:
 # -- the dead band ----------------------------------------------------------------------------------------
 
 
-def for_linear_models(plant: Actuator) -> Actuator:
-    """With the integral at work everywhere, and sensors that read between their counts."""
+def prepare_linear(plant: Actuator) -> Actuator:
+    """The actuator without dead band of its integral, and without quantization."""
 
     def changed(remedies: IntegralRemedies | None) -> IntegralRemedies | None:
         return None if remedies is None else replace(remedies, dead_band=None)
@@ -106,12 +106,12 @@ def for_linear_models(plant: Actuator) -> Actuator:
     return without_counts(_with_remedies(plant, changed))
 
 
-def dead_banded(plant: Actuator) -> Actuator:
-    """With a dead band of the integral, of width zero where it had none."""
+def add_dead_band(plant: Actuator) -> Actuator:
+    """The actuator with a dead band of its integral, of width zero where it had none."""
 
     def changed(remedies: IntegralRemedies | None) -> IntegralRemedies:
-        kept = remedies or IntegralRemedies()
-        return replace(kept, dead_band=kept.dead_band or 0.0)
+        options = remedies or IntegralRemedies()
+        return replace(options, dead_band=options.dead_band or 0.0)
 
     return _with_remedies(plant, changed)
 
@@ -122,7 +122,7 @@ def _with_remedies(plant: Actuator, changed: Callable[[IntegralRemedies | None],
 
 
 def with_dead_band(plant: Actuator, gains: Mapping[str, float], error: float) -> dict[str, float]:
-    """Gains and the dead band that leaves this error [rad] at the load.
+    """Gains with the dead band that allows this error [rad] at the load.
 
     A PID integrates the error itself, a cascade that of the motor speed [rad/s], ratio * position gain times as large.
     """

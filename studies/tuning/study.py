@@ -29,12 +29,12 @@ from studies.tuning.measures import Measure, measures, worst
 from studies.tuning.modes import CornerModes, corner_modes
 from studies.tuning.plant import (
     NotTunable,
-    closed_form,
-    dead_banded,
+    add_dead_band,
     defaults_of,
     efforts_of,
-    for_linear_models,
     gains_of,
+    initial_gains,
+    prepare_linear,
     with_dead_band,
 )
 from studies.tuning.result import Round, Tuned, shortfalls
@@ -87,11 +87,11 @@ def tune(  # noqa: PLR0913 - the task, and how it is run
     """
     tell = progress or (lambda phase, share: None)
     require_tunable(specification, original)
-    demand, linear, plant = specification.demand, for_linear_models(original), dead_banded(original)
+    demand, linear, plant = specification.demand, prepare_linear(original), add_dead_band(original)
     corners = specification.all_corners(original)
     defaults = defaults_of(plant.system().parameters)
     before = {name: defaults[name] for name in specification.tuning.gains}
-    start = {name: value for name, value in closed_form(original, demand).items() if name in before}
+    start = {name: value for name, value in initial_gains(original, demand).items() if name in before}
     everywhere = [
         corner_modes(linear, corner, demand.stiction_margin, before)
         for k, corner in enumerate(corners)

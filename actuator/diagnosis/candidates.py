@@ -14,7 +14,7 @@ from actuator.parts.sensors import Sensors
 from actuator.simulation.run import Run
 from actuator.stiction.breakaway import NotAtRest
 from actuator.stiction.equilibrium_set import EquilibriumSet, find_equilibrium_set
-from actuator.system.contact_modes import FREE, STUCK
+from actuator.system.contact_modes import find_standstill
 from actuator.system.drive import ANGLES
 from actuator.system.parameters import with_values
 from actuator.verdict.verdict import classify
@@ -25,7 +25,7 @@ from controllers.countermeasures import UNKNOWN, StickingCycle
 class Candidate(NamedTuple):
     """A remedy with its setting, and what is predicted of it: the largest error at rest [rad], nan where nothing is.
 
-    `forced` is the period [s] of a motion that the remedy itself makes.
+    `period` is that [s] of a motion that the remedy itself makes.
     """
 
     name: str
@@ -33,10 +33,10 @@ class Candidate(NamedTuple):
     plant: Actuator
     parameters: dict[str, float]
     error: float
-    forced: float = UNKNOWN
+    period: float = UNKNOWN
 
 
-def candidates(plant: Actuator, run: Run) -> list[Candidate]:
+def find_candidates(plant: Actuator, run: Run) -> list[Candidate]:
     """Remedies that suit the controller, with their settings.
 
     Raises
@@ -61,7 +61,7 @@ def candidates(plant: Actuator, run: Run) -> list[Candidate]:
             plant=plants[id(each.controller)],
             parameters=given | {f"controller.{path}": value for path, value in each.numbers.items()},
             error=each.error,
-            forced=each.period,
+            period=each.period,
         )
         for each in offered
     ]
@@ -89,9 +89,7 @@ def _cycle(plant: Actuator, run: Run) -> StickingCycle:
 
 def _held(plant: Actuator, run: Run) -> EquilibriumSet:
     """Motor torques that stiction holds in the last standstill of the run; what the motor went through without one."""
-    rows = np.array([np.isin(values, (STUCK, FREE)) for values in run.modes.values()])
-    standing = np.flatnonzero(rows.all(axis=0))
-    for k in standing[-1:]:
+    for k in np.flatnonzero(find_standstill(run.modes))[-1:]:
         try:
             return find_equilibrium_set(
                 replace(plant, sensors=Sensors()), run.state(int(k)), parameters=changed_parameters(run)

@@ -1,33 +1,39 @@
 """Why it hunts: the energy each element gives per cycle, and the same run with one cause removed."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from enum import StrEnum
 from typing import TYPE_CHECKING, NamedTuple
 
 from actuator.actuator import Actuator
 from actuator.diagnosis.cycle_energy import CycleEnergy, changed_parameters, energy_per_cycle
-from actuator.parts.sensors import AngleSensor, CurrentSensor, Sensors
+from actuator.parts.sensors import Sensors
 from actuator.simulation.run import Run
 from actuator.simulation.signals import Signal
+from actuator.system.hybrid import HybridSystem
+from actuator.system.parameters import Parameter, breakaway_floor, motion_integrals
 from actuator.verdict.verdict import REST, Hunting, classify, decide
+from gear.quantities.roles import Breakaway, Gap, Limit, Resolution
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-STATIC, BACKLASH, INTEGRAL = "breakaway above sliding friction", "backlash", "integral action"
-LIMITS, SAMPLING, COUNTS = "limits", "sampling", "counts of the sensors"
-SLIDING = {".breakaway": (".coulomb",), ".static": (".sliding", ".coulomb")}  # what breakaway is compared with
-INTEGRALS = ("controller.integral", "controller.speed.integral", "controller.position.integral")
-LIMITED = (
-    "motor.torque_limit",
-    "controller.limit",
-    "controller.speed_limit",
-    "controller.speed.limit",
-    "controller.position.limit",
-    "inverter.current_limit",
-    "inverter.dc_voltage",
-)
 FAR = 1e3  # factor on a limit that is never reached
+NEARLY_NONE = 1e-9  # factor on a gain that must not be zero
+
+
+class Cause(StrEnum):
+    """What may let an actuator hunt, and can be removed."""
+
+    STATIC = "breakaway above sliding friction"
+    BACKLASH = "backlash"
+    INTEGRAL = "integral action"
+    LIMITS = "limits"
+    SAMPLING = "sampling"
+    COUNTS = "counts of the sensors"
+
+
+STATIC, BACKLASH, INTEGRAL, LIMITS, SAMPLING, COUNTS = Cause
 
 
 class Removal(NamedTuple):
@@ -44,13 +50,15 @@ class Counterfactual:
 
     Attributes
     ----------
-    cause, change : str
-        What was removed, and how.
+    cause : Cause
+        What was removed.
+    change : str
+        How.
     hunting : Hunting
         What it does without.
     """
 
-    cause: str
+    cause: Cause
     change: str
     hunting: Hunting
 
@@ -84,10 +92,13 @@ class Causes:
             return f"There is no cycle to explain: {self.hunting.verdict}."
         needed = [each.cause for each in self.counterfactuals if each.needed]
         still = [each.cause for each in self.counterfactuals if each.hunting.cycles]
-        parts = [f"without {name} it comes to rest" for name in needed]
-        parts += [f"without {name} it goes on" for name in still]
-        driven = "" if self.energy is None else f"; the {self.energy.drives} gives the energy"
-        return f"{'; '.join(parts) or 'no cause was found to remove'}{driven}.".capitalize()
+        told = f"Removing {' or '.join(needed)} stops the hunting" if needed else ""
+        if needed and still:
+            told += f"; removing {' or '.join(still)} does not"
+        elif still:
+            told = f"Removing {' or '.join(still)} does not stop the hunting"
+        driven = "" if self.energy is None else f" The {self.energy.drives} supplies the energy."
+        return f"{told or 'No cause was found'}.{driven}"
 
     def table(self) -> str:
         """What it does with each cause removed, and the energies, as lines of text."""
@@ -150,41 +161,47 @@ def find_causes(  # noqa: PLR0913 - what is simulated
     return Causes(hunting=verdict, energy=energy, counterfactuals=tuple(found))
 
 
-def removals(plant: Actuator, parameters: Mapping[str, float] | None = None) -> dict[str, Removal]:
+def removals(plant: Actuator, parameters: Mapping[str, float] | None = None) -> dict[Cause, Removal]:
     """The actuator with each of its possible causes of hunting removed, by cause; `parameters` differ from defaults."""
-    given = dict(parameters or {})
-    values = {quantity.name: float(quantity.default) for quantity in plant.system().parameters} | given
+    given, system = dict(parameters or {}), plant.system()
+    values = {quantity.name: float(quantity.default) for quantity in system.parameters} | given
+    floors = {each.name: breakaway_floor(each, values) for each in system.parameters_having(Breakaway)}
+    gaps = {each.name: 0.0 for each in system.parameters_having(Gap) if values[each.name] > 0}
+    gains = {each.name: _none_of(system, each) for each in motion_integrals(system.parameters) if values[each.name] > 0}
+    limits = {each.name: FAR * values[each.name] for each in system.parameters_having(Limit)}
     changes = {
-        STATIC: (_without_static(values), "breakaway friction as low as sliding friction"),
-        BACKLASH: ({n: 0.0 for n, value in values.items() if n.endswith(".gap") and value > 0}, "all gaps closed"),
-        INTEGRAL: ({n: 0.0 for n in INTEGRALS if values.get(n, 0) > 0}, "integral gains of speed and position zero"),
-        LIMITS: ({n: FAR * values[n] for n in LIMITED if n in values}, f"limits {FAR:g} times as far"),
+        STATIC: (
+            {name: floor for name, floor in floors.items() if floor is not None and floor < values[name]},
+            "breakaway friction as low as sliding friction",
+        ),
+        BACKLASH: (gaps, "all gaps closed"),
+        INTEGRAL: (gains, "integral gains zero"),
+        LIMITS: (limits, f"limits {FAR:g} times as far"),
     }
     found = {cause: Removal(plant, given | changed, text) for cause, (changed, text) in changes.items() if changed}
     if plant.sampling is not None and plant.controller is not None:
         ideal = replace(plant, sampling=None, sensors=Sensors(), controller=plant.controller.in_continuous_time())
         found[SAMPLING] = Removal(ideal, _kept(given, ideal), "controller in continuous time, sensors ideal")
-    if any(getattr(getattr(plant.sensors, name), "resolution", None) for name in ("motor", "load", "current")):
+    if system.parameters_having(Resolution):
         smooth = replace(plant, sensors=_without_counts(plant.sensors))
         found[COUNTS] = Removal(smooth, _kept(given, smooth), "sensors without resolution")
     return found
 
 
-def _without_static(values: Mapping[str, float]) -> dict[str, float]:
-    found = {}
-    for name, value in values.items():
-        for ending, others in SLIDING.items():
-            partner = next((p for p in (name.removesuffix(ending) + other for other in others) if p in values), None)
-            if name.endswith(ending) and partner is not None and values[partner] < value:
-                found[name] = values[partner]
-    return found
+def _none_of(system: HybridSystem, gain: Parameter) -> float:
+    """Zero, or next to it where a gain must be positive."""
+    try:
+        system.parameter_values({gain.name: 0.0})
+    except ValueError:
+        return NEARLY_NONE * gain.default
+    return 0.0
 
 
 def _without_counts(sensors: Sensors) -> Sensors:
-    def smooth(sensor: AngleSensor | CurrentSensor | None) -> object:
-        return None if sensor is None else replace(sensor, resolution=None)
-
-    return replace(sensors, **{name: smooth(getattr(sensors, name)) for name in ("motor", "load", "current")})
+    """The same sensors without resolution."""
+    given = {field.name: getattr(sensors, field.name) for field in fields(sensors)}
+    smooth = {name: replace(sensor, resolution=None) for name, sensor in given.items() if sensor is not None}
+    return replace(sensors, **smooth)
 
 
 def _kept(parameters: Mapping[str, float], plant: Actuator) -> dict[str, float]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuator.actuator import Actuator
-from actuator.diagnosis.candidates import Candidate, candidates
+from actuator.diagnosis.candidates import Candidate, find_candidates
 from actuator.simulation.many import run_many, submit_many
 from actuator.simulation.run import Run
 from actuator.simulation.signals import Signal
@@ -23,8 +23,9 @@ if TYPE_CHECKING:
 
 LADDER = (1.0, 1.4, 2.0, 2.8, 4.0)  # factors on breakaway friction that are tried
 CYCLES = 5.0  # periods of the cycle that a run with a remedy's own motion lasts
-NOTHING = 1e-6  # rad; an error that is none
-MOST_FORCED, SAME = 3.5, 0.02  # periods of a remedy's own motion after which a cycle may repeat, and how exactly
+NO_ERROR = 1e-6  # rad; an error that is none
+MOST_PERIODS, SAME = 3.5, 0.02  # of a remedy's own motion after which a cycle may repeat, and how exactly
+FOLLOWS = "follows the remedy"  # outcome where what is left is the motion that the remedy itself makes
 UNKNOWN = float("nan")
 
 
@@ -40,8 +41,8 @@ class Remedy:
         Largest error [rad] at which it may rest; nan without a prediction.
     hunting : Hunting
         Simulated.
-    forced : bool
-        Whether what is left is the motion that the remedy itself makes, and no hunting.
+    excited : bool
+        Whether what is left is excited by the remedy, and no hunting.
     stiction_factor : float
         Largest factor on all breakaway friction that was tried and at which it still comes to rest; zero where it does
         not come to rest, nan where that was not tried.
@@ -52,12 +53,12 @@ class Remedy:
     predicted_error: float
     hunting: Hunting
     stiction_factor: float
-    forced: bool = False
+    excited: bool = False
 
     @property
-    def does(self) -> str:
+    def outcome(self) -> str:
         """The verdict, in words."""
-        return "follows the remedy" if self.forced else self.hunting.verdict
+        return FOLLOWS if self.excited else self.hunting.verdict
 
     @property
     def error(self) -> float:
@@ -67,9 +68,9 @@ class Remedy:
 
     @property
     def rank(self) -> tuple[float, ...]:
-        """What rests stands first, then by the error, the stiction factor and the heat; the undecided stands last."""
-        order = 0 if self.hunting.verdict == REST or self.forced else 1 if self.hunting.cycles else 2
-        error = math.inf if math.isnan(self.error) else self.error if self.error > NOTHING else 0.0
+        """Sorted by verdict (at rest, cycling, undecided), then error, stiction factor and loss."""
+        order = 0 if self.hunting.verdict == REST or self.excited else 1 if self.hunting.cycles else 2
+        error = math.inf if math.isnan(self.error) else self.error if self.error > NO_ERROR else 0.0
         heat = self.hunting.duty.mean_loss
         return order, error, -np.nan_to_num(self.stiction_factor), math.inf if math.isnan(heat) else heat
 
@@ -91,9 +92,9 @@ class RemedyTable:
 
     def table(self) -> str:
         """One line per remedy: setting, verdict, error predicted and simulated, amplitude, heat, stiction factor."""
-        rows = [("remedy", "setting", "does", "error", "predicted", "amplitude", "loss", "stiction")]
+        rows = [("remedy", "setting", "outcome", "error", "predicted", "amplitude", "loss", "stiction")]
         rows += [("", "", "", "mrad", "mrad", "mrad", "W", "factor")]
-        rows += [cells(each) for each in (self.before, *self.ranked)]
+        rows += [format_remedy(each) for each in (self.before, *self.ranked)]
         widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
         left = 3  # columns of words
         return "\n".join(
@@ -111,7 +112,7 @@ class RemedyTable:
         return plot_remedies(self)
 
 
-def cells(remedy: Remedy) -> tuple[str, ...]:
+def format_remedy(remedy: Remedy) -> tuple[str, ...]:
     """A remedy as texts of a table: name, setting, verdict, errors and amplitude [mrad], loss [W], stiction factor."""
     found = remedy.hunting
     factor = "< 1" if remedy.stiction_factor == 0 else _number(remedy.stiction_factor)
@@ -120,8 +121,8 @@ def cells(remedy: Remedy) -> tuple[str, ...]:
     return (
         remedy.name,
         remedy.setting,
-        remedy.does,
-        _number(1e3 * remedy.error if not remedy.error < NOTHING else 0.0),
+        remedy.outcome,
+        _number(1e3 * remedy.error if not remedy.error < NO_ERROR else 0.0),
         "<= " + _number(1e3 * remedy.predicted_error) if math.isfinite(remedy.predicted_error) else "-",
         _number(1e3 * found.amplitude_rad) if found.cycles else "-",
         _number(found.duty.mean_loss),
@@ -176,8 +177,8 @@ class RemedySearch:
         # a motion that never stops is slow to simulate: as long as it takes to see the cycle that it should end
         short = min(whole, float(record_motion(run).time[0]) + CYCLES * self.hunting.period_s)
         self._work: dict[str, _Work] = {
-            f"remedy {k}": (each, whole if math.isnan(each.forced) else short, options)
-            for k, each in enumerate(candidates(plant, run), 1)
+            f"remedy {k}": (each, whole if math.isnan(each.period) else short, options)
+            for k, each in enumerate(find_candidates(plant, run), 1)
         }
         self._done = {} if done is None else done
         self._begun = submit_many(_try_remedy, self._work, executor, done=self._done) if executor else None
@@ -212,9 +213,9 @@ def _try_remedy(work: _Work) -> Remedy:
     candidate, duration, options = work
     plant, parameters = candidate.plant, candidate.parameters
     first = decide(plant, duration, parameters=parameters, **options).hunting
-    periods = first.period_s / candidate.forced
-    forced = bool(0.5 < periods < MOST_FORCED and abs(periods - round(periods)) < SAME * periods)  # noqa: PLR2004
-    factor = UNKNOWN if forced else 0.0  # for the same reason it is not tried
+    periods = first.period_s / candidate.period
+    excited = bool(0.5 < periods < MOST_PERIODS and abs(periods - round(periods)) < SAME * periods)  # noqa: PLR2004
+    factor = UNKNOWN if excited else 0.0  # for the same reason it is not tried
     if first.verdict == REST:
         factor = _stiction_factor(plant, parameters, duration, options)
     return Remedy(
@@ -223,7 +224,7 @@ def _try_remedy(work: _Work) -> Remedy:
         predicted_error=candidate.error,
         hunting=first,
         stiction_factor=factor,
-        forced=forced,
+        excited=excited,
     )
 
 

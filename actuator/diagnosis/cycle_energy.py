@@ -11,13 +11,14 @@ from actuator.simulation.simulate import simulate
 from actuator.system.parameters import with_values
 from actuator.verdict.verdict import classify
 from controllers.controller import Controller
+from gear.quantities.roles import FrictionHeat
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 POINTS = 20_000  # in a period
 CHANGED = 1e-12  # relative difference from a default
-LEAST = 1e-3  # part of the largest share that is shown
+SHOWN = 1e-3  # part of the largest share from which one is shown
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +53,7 @@ class CycleEnergy:
 
     def shown(self) -> dict[str, float]:
         """Elements that matter, the largest giver first."""
-        least = LEAST * max(map(abs, self.elements.values()))
+        least = SHOWN * max(map(abs, self.elements.values()))
         kept = {name: value for name, value in self.elements.items() if abs(value) >= least}
         return dict(sorted(kept.items(), key=lambda pair: -pair[1]))
 
@@ -105,10 +106,9 @@ def energy_per_cycle(plant: Actuator, run: Run, *, compiled: bool | None = None)
     )
     powers = {name: torque * cycle["motor_speed"] for name, torque in _torques(plant, cycle, parameters).items()}
     powers["load"] = cycle["total_load_torque"] * cycle["load_speed"]
-    losses = {name: -values for name, values in cycle.signals.items() if name.endswith(".friction_loss")}
-    powers |= {
-        f"friction of {name.removeprefix('gear.').removesuffix('.friction_loss')}": p for name, p in losses.items()
-    }
+    for output in cycle.system.outputs:
+        if (heat := output.role(FrictionHeat)) is not None:
+            powers[f"friction of {heat.contact}"] = -cycle[output.name]
     powers["damping"] = -cycle["damping_loss"]
     energy = cycle["mechanical_energy"]
     return CycleEnergy(

@@ -77,7 +77,7 @@ def plot_remedies(table: "RemedyTable") -> Figure:
     rows = [table.before, *table.ranked]
     figure = Figure(figsize=(9, 1.4 + ROW * len(rows)), layout="constrained")
     panels = figure.subplots(1, 3, sharey=True, width_ratios=[2, 1, 1])
-    colors = [VERDICT_COLORS[Verdict.REST if row.forced else row.hunting.verdict] for row in rows]
+    colors = [VERDICT_COLORS[Verdict.REST if row.excited else row.hunting.verdict] for row in rows]
     columns = (
         (CYCLE.label("largest error"), [CYCLE.scale * row.error for row in rows]),
         ("mean loss in W", [row.hunting.duty.mean_loss for row in rows]),
@@ -88,7 +88,7 @@ def plot_remedies(table: "RemedyTable") -> Figure:
         axes.set_xlabel(label)
         axes.grid(axis="x", alpha=0.3)
         if axes is panels[0]:  # a row without a bar has no error, or no verdict
-            axes.bar_label(bars, [row.does for row in rows], padding=3, fontsize="small")
+            axes.bar_label(bars, [row.outcome for row in rows], padding=3, fontsize="small")
             axes.set_xlim(0, (1 + ROOM) * max(np.nan_to_num(values)) or 1.0)
     panels[0].set_yticks(range(len(rows)), [f"{row.name} {row.setting}".strip() for row in rows])
     panels[0].invert_yaxis()

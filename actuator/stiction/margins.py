@@ -18,8 +18,7 @@ from typing import Any, NamedTuple
 from actuator.actuator import Actuator
 from actuator.simulation.run import Run
 from actuator.system.hybrid import HybridSystem, require_sticking
-from actuator.system.parameters import Parameter, motion_integrals
-from actuator.system.parameters import at_least_sliding as keep_above_sliding
+from actuator.system.parameters import Parameter, at_least_sliding, motion_integrals
 from actuator.verdict.verdict import REST, UNDECIDED, Hunting, decide
 from gear.quantities.roles import Breakaway, Gap
 
@@ -217,7 +216,7 @@ class _Trials:
 
     def _decide(self, factor: float, begin: Mapping[str, float] | None) -> tuple[Run, Hunting]:
         """A run, continued where its verdict waits for a slow controller; what moves irregularly, moves."""
-        numbers = {p.name: keep_above_sliding(p, factor * self.values[p.name], self.values) for p in self.scaled}
+        numbers = {p.name: at_least_sliding(p, factor * self.values[p.name], self.values) for p in self.scaled}
         options = {**self.common, "parameters": {**self.changed, **numbers}}
         step = self.duration / POINTS
         run, verdict = decide(self.plant, self.length, longest=1.0, start=begin, resolution=step, **options)
@@ -235,22 +234,3 @@ class _Trials:
 def hunting_margins(plant: Actuator, kinds: Sequence[str] = tuple(MarginKind), **options) -> dict[str, HuntingMargin]:
     """All margins by kind that the actuator has parameters for; options as of `hunting_margin`."""
     return {kind: hunting_margin(plant, kind, **options) for kind in kinds if find_scaled(plant.system(), kind)}
-
-
-# -- for studies that still read these names ------------------------------------------------------------------
-
-SLIDING = {".breakaway": (".coulomb",), ".static": (".sliding", ".coulomb")}
-
-
-def sliding_of(name: str, values: Mapping[str, float]) -> str | None:
-    """Name of the sliding friction that belongs to a breakaway friction; None for what is none, or has none."""
-    for ending, others in SLIDING.items():
-        if name.endswith(ending):
-            return next((other for part in others if (other := name.removesuffix(ending) + part) in values), None)
-    return None
-
-
-def at_least_sliding(name: str, value: float, values: Mapping[str, float]) -> float:
-    """A value for a parameter; for breakaway friction no less than its sliding friction among the values."""
-    other = sliding_of(name, values)
-    return value if other is None else max(value, values[other])

@@ -10,6 +10,7 @@ from actuator.system.contacts import ContactForces, ContactMechanics, ContactMod
 from actuator.system.hybrid import Place
 from controllers.controller import PlantMotion
 from gear.quantities import Matrix, Scalar
+from gear.quantities.roles import FrictionHeat
 from gear.transmission import Contact
 
 
@@ -73,7 +74,7 @@ def observe(book: SystemBuilder, seen: Mechanics, motion: PlantMotion) -> None:
         unit = ("m/s", "N") if contact.place == Place.MESH else ("rad/s", "N m")
         book.output(f"gear.{contact.name}.slip_speed", unit[0], slip)
         book.output(f"gear.{contact.name}.friction", unit[1], scalar)
-        book.output(f"gear.{contact.name}.friction_loss", "W", lost[contact.name])
+        book.output(f"gear.{contact.name}.friction_loss", "W", lost[contact.name], FrictionHeat(contact.name))
         friction[contact.name] = scalar
     rigid = contacts.rigid_forces(forces, seen.torque)
     for name, normal in {**forces.normal, **rigid}.items():

@@ -147,6 +147,13 @@ class Heat(Role):
 
 
 @dataclass(frozen=True)
+class FrictionHeat(Role):
+    """Part of the friction heat: that of one contact, by its path in the gear."""
+
+    contact: str
+
+
+@dataclass(frozen=True)
 class LoopSignal(Role):
     """A signal inside a control loop, as output, as the input that is added to it, or as the state that holds it."""
 

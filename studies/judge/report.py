@@ -6,7 +6,7 @@ from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from actuator.diagnosis.countermeasures import Remedy, cells
+from actuator.diagnosis.countermeasures import Remedy, format_remedy
 from actuator.orbits.sampled import PeriodicOrbit
 from actuator.plots.bode import plot_loops
 from actuator.plots.runs import plot_run
@@ -53,7 +53,7 @@ def sentences(judgment: Judgment) -> list[str]:
         text.append(insight.causes.sentence())
     if insight.remedies:
         best = insight.remedies.ranked[0]
-        text.append(f"best countermeasure: {' '.join((best.name, best.setting)).strip()} ({best.does})")
+        text.append(f"best countermeasure: {' '.join((best.name, best.setting)).strip()} ({best.outcome})")
     return text
 
 
@@ -153,7 +153,7 @@ def _remedy(remedy: Remedy) -> dict[str, Any]:
     return {
         "name": remedy.name,
         "setting": remedy.setting,
-        "does": remedy.does,
+        "does": remedy.outcome,
         "error_rad": remedy.error,
         "predicted_error_rad": remedy.predicted_error,
         "amplitude_rad": found.amplitude_rad,
@@ -173,7 +173,7 @@ def _html(judgment: Judgment, result: dict[str, Any], pictures: Mapping[str, str
         run=judgment.run,
         result=result,
         insight=judgment.insight,
-        remedies=[cells(each) for each in (table.before, *table.ranked)] if table else [],
+        remedies=[format_remedy(each) for each in (table.before, *table.ranked)] if table else [],
         pictures=pictures,
         ratio=judgment.case.actuator.gear.ratio(),
         most=MOST,

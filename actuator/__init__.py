@@ -129,6 +129,7 @@ from actuator.stiction.margins import hunting_margins as hunting_margins
 from actuator.system.hybrid import HybridSystem as HybridSystem
 from actuator.verdict.log import classify_log as classify_log
 from actuator.verdict.verdict import Hunting as Hunting
+from actuator.verdict.verdict import Verdict as Verdict
 from actuator.verdict.verdict import classify as classify
 from actuator.verdict.verdict import decide as decide
 from gear.quantities import renamed as _renamed

@@ -1,12 +1,12 @@
 """Describing functions of friction, backlash and whole gear stages; the cycle they predict, and whether to trust it.
 
 For a sine of amplitude A at the input of a nonlinearity, the describing function is the ratio of the first harmonic of
-its output to the input, N(A, w). With the linear rest L in negative feedback a cycle is predicted where
+its output to the input, N(A, w). With the linear part L of the loop in negative feedback a cycle is predicted where
 
     L(j w) N(A, w) = -1
 
 and it is stable where -1/N, followed towards larger amplitudes, leaves the region that the curve L encircles. The
-prediction rests on L letting the higher harmonics fade; how large they are at the nonlinearity's input says whether.
+prediction assumes that L attenuates the higher harmonics; their size at the nonlinearity's input says whether it does.
 
 References
 ----------

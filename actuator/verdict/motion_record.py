@@ -109,7 +109,7 @@ def _resolution(run: Run) -> float:
 
 
 def _drift(run: Run, keep: np.ndarray) -> tuple[str, float]:
-    """The controller state that still moves behind a standing load, in words, and when what it loads lets go [s]."""
+    """The controller state that still drifts behind a load at rest, in words, and the time to breakaway [s]."""
     if keep.sum() < QUARTERS:
         return "", float("nan")
     for quantity in run.system.states:

@@ -58,7 +58,7 @@ def time_swings(time: np.ndarray, signal: np.ndarray, turns: list[int]) -> np.nd
 def measure_period(time: np.ndarray, load: np.ndarray, start: float, end: float) -> float:
     """Period from upward passages of mid-swing, of about one period from `start` to `end`; that, where there are none.
 
-    A passage is exact where the moment of a swing rests on where its turns are taken to be.
+    A passage is exact; the time of a swing depends on where its turning points are taken to be.
     """
     rough = end - start
     window = (time >= start) & (time <= end)

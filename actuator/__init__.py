@@ -77,6 +77,7 @@ from actuator.parts.thermal import ThermalPath as ThermalPath
 from actuator.parts.torque_source import TorqueSource as TorqueSource
 from actuator.parts.torque_speed import TorqueSpeedCurve as TorqueSpeedCurve
 from actuator.parts.torque_speed import torque_speed_curve as torque_speed_curve
+from actuator.response.bench.bench import Bench as Bench
 from actuator.response.bench.free_play import BackDriving as BackDriving
 from actuator.response.bench.free_play import FreePlay as FreePlay
 from actuator.response.bench.free_play import back_driving as back_driving
@@ -86,23 +87,22 @@ from actuator.response.bench.long import rate_test as rate_test
 from actuator.response.bench.long import soak_test as soak_test
 from actuator.response.bench.slow import staircase_test as staircase_test
 from actuator.response.bench.slow import triangle_test as triangle_test
-from actuator.response.bench.steps import Bench as Bench
 from actuator.response.bench.steps import step_test as step_test
-from actuator.response.broadband import chirp_response as chirp_response
-from actuator.response.broadband import multisine_response as multisine_response
 from actuator.response.frequency_response import FrequencyResponse as FrequencyResponse
 from actuator.response.frequency_response import frequency_response as frequency_response
 from actuator.response.frequency_response import temperature_sets as temperature_sets
-from actuator.response.record import Record as Record
-from actuator.response.record import Spectrum as Spectrum
-from actuator.response.record import read_record as read_record
 from actuator.response.sine import SinePoint as SinePoint
 from actuator.response.sine import SineResponse as SineResponse
 from actuator.response.sine import SineStream as SineStream
+from actuator.response.spectra import Record as Record
+from actuator.response.spectra import Spectrum as Spectrum
+from actuator.response.spectra import chirp_response as chirp_response
+from actuator.response.spectra import multisine_response as multisine_response
+from actuator.response.spectra import read_record as read_record
 from actuator.response.stiffness import DynamicStiffness as DynamicStiffness
+from actuator.response.stiffness import block_motor as block_motor
 from actuator.response.stiffness import dynamic_stiffness as dynamic_stiffness
-from actuator.response.stiffness import locked as locked
-from actuator.response.stiffness import unpowered as unpowered
+from actuator.response.stiffness import remove_drive as remove_drive
 from actuator.simulation.failures import Chattering as Chattering
 from actuator.simulation.failures import InconsistentModes as InconsistentModes
 from actuator.simulation.failures import SimulationError as SimulationError
@@ -142,6 +142,8 @@ FORMER: dict[str, str] = {  # until 0.3
     "described_hunting": "check_describing_function",
     "follow": "continue_orbit",
     "gear_stage": "stage_response",
+    "locked": "block_motor",
+    "unpowered": "remove_drive",
     "predicted_cycles": "predict_cycles",
     "rest": "predict_breakaway",
     "rest_set": "find_equilibrium_set",

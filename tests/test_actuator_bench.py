@@ -24,17 +24,17 @@ from actuator import (
     ThermalNetwork,
     TorqueSource,
     back_driving,
+    block_motor,
     dynamic_stiffness,
     free_play,
     hold_test,
-    locked,
     rate_test,
+    remove_drive,
     soak_test,
     staircase_test,
     step_test,
     temperature_sets,
     triangle_test,
-    unpowered,
 )
 from controllers import PI, PID, Cascade, P
 from gear import Bearing, Coupling, Shaft, Transmission
@@ -304,7 +304,7 @@ def test_a_torque_that_friction_takes_meets_an_infinite_stiffness():
 
 @pytest.mark.parametrize(("gap", "friction"), [(GAP, 1.0), (2 * GAP, 0.5)])
 def test_the_free_play_of_a_blocked_drive_is_its_gap_less_what_friction_bends(gap, friction):
-    found = free_play(locked(geared(gap, load_friction=friction)), torque=10.0, compiled=False)
+    found = free_play(block_motor(geared(gap, load_friction=friction)), torque=10.0, compiled=False)
     assert found.width_rad == pytest.approx(gap - 2 * friction / SPRING, rel=0.02)
     assert found.lost_motion_rad == pytest.approx(gap + 2 * friction / SPRING, rel=0.02)
     assert found.stiffness == pytest.approx(SPRING, rel=0.01)
@@ -318,14 +318,14 @@ def test_a_load_that_nothing_holds_has_no_play():
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_a_drive_is_driven_back_by_the_friction_of_both_sides(sign):
-    found = back_driving(unpowered(geared()), highest=sign * 3.0, compiled=False)
+    found = back_driving(remove_drive(geared()), highest=sign * 3.0, compiled=False)
     assert found.torque == pytest.approx(sign * (0.5 + 1.0), rel=0.01)
     assert not found.locks
     assert "driven back" in found.plot().axes[0].get_title()
 
 
 def test_a_drive_that_is_not_driven_back_locks():
-    found = back_driving(unpowered(geared()), highest=1.4, compiled=False)
+    found = back_driving(remove_drive(geared()), highest=1.4, compiled=False)
     assert found.locks
     assert found.torque == math.inf
     assert "locks up to 1.4 N m" in found.plot().axes[0].get_title()
@@ -334,7 +334,7 @@ def test_a_drive_that_is_not_driven_back_locks():
 def test_an_unpowered_actuator_keeps_the_inertia_of_its_rotor():
     aileron = load_case("aileron").actuator
     assert isinstance(aileron.motor, PMSM)
-    loose = unpowered(aileron)
+    loose = remove_drive(aileron)
     before = aileron.motor.inertia + aileron.gear.shafts["motor"].inertia
     assert loose.gear.shafts["motor"].inertia == pytest.approx(before)
     assert "motor_torque" in [output.name for output in loose.system().outputs]
@@ -346,9 +346,9 @@ def test_an_unpowered_rotor_with_drag_is_refused():
         aileron, motor=dataclasses.replace(aileron.motor, rotor=Rotor(drag=RotorDrag(viscous=1e-4)))
     )
     with pytest.raises(ValueError, match="no place for the cogging and drag of a rotor"):
-        unpowered(dragging)
+        remove_drive(dragging)
 
 
 def test_a_load_of_its_own_stays_on_an_unpowered_actuator():
     loaded = dataclasses.replace(geared(), load=Load(stiffness=7.0))
-    assert unpowered(loaded).load == Load(stiffness=7.0)
+    assert remove_drive(loaded).load == Load(stiffness=7.0)

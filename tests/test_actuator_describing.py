@@ -8,7 +8,7 @@ from test_actuator_orbit import hunting
 
 from actuator import Actuator, Load, TorqueSource, find_orbit
 from actuator.describing.check import check_describing_function
-from actuator.describing.describing import backlash, coulomb_friction, first_harmonic, predict_cycles, stage_response
+from actuator.describing.describing import backlash, coulomb_friction, harmonics_of, predict_cycles, stage_response
 from gear import Bearing, Shaft, Transmission
 
 
@@ -20,7 +20,7 @@ def guide(coulomb=0.0, breakaway=0.0, viscous=2.0):
 
 def test_harmonics_of_a_square_wave_are_odd_and_fall_like_one_over_their_number():
     time = np.linspace(0, 2.0, 200001)
-    found = first_harmonic(time, np.sign(np.sin(np.pi * time)), 0.5)
+    found = harmonics_of(time, np.sign(np.sin(np.pi * time)), 0.5)
     expected = [4 / (np.pi * k) if k % 2 else 0.0 for k in range(1, 10)]
     np.testing.assert_allclose(found, expected, atol=1e-4)
 

@@ -167,7 +167,7 @@ def few_events(monkeypatch):
 
 @pytest.mark.parametrize("compiled", [False, pytest.param(True, marks=needs_compiler)])
 def test_modes_that_flip_without_time_passing_are_chattering_with_time_and_modes(few_events, compiled):
-    message = r"clock: the run cannot go on after t = 0.002 s .*contact0.motion = [01]"
+    message = r"clock: simulation stopped at t = 0.002 s: .*contact0.motion = [01]"
     with pytest.raises(SimulationError, match=message) as caught:
         simulate(ticking(1e-13), 0.01, start={"x0": 0.002}, compiled=compiled)
     assert caught.type is Chattering

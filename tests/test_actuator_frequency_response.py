@@ -34,9 +34,9 @@ from actuator import (
     temperature_sets,
     trim,
 )
-from actuator.response.fourier import fourier
 from actuator.response.frequency_response import point_key
 from actuator.response.sine import SinePoint
+from actuator.simulation.fourier import fourier_coefficients
 from controllers import PID, Sampling
 from gear import Bearing, KnownOil, OilAt, Shaft, Thickening, Transmission
 
@@ -369,13 +369,13 @@ def test_a_measured_sine_is_reduced_as_a_simulated_one(tmp_path):
 
 def test_a_triangle_has_its_fourier_series():
     time = np.linspace(0, 2, 4001)
-    found = fourier(time, signal.sawtooth(2 * np.pi * time, 0.5)[None], 1.0, 5)[0]
+    found = fourier_coefficients(time, signal.sawtooth(2 * np.pi * time, 0.5)[None], 1.0, 5)[0]
     np.testing.assert_allclose(found, [0, -8 / np.pi**2, 0, -8 / (9 * np.pi**2), 0, -8 / (25 * np.pi**2)], atol=1e-6)
 
 
 def test_part_of_a_period_is_refused():
     with pytest.raises(ValueError, match="needs whole periods of 1 Hz, got 1.5 s"):
-        fourier(np.linspace(0, 1.5, 100), np.zeros((1, 100)), 1.0, 3)
+        fourier_coefficients(np.linspace(0, 1.5, 100), np.zeros((1, 100)), 1.0, 3)
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ from actuator.describing.describing import (
     TRUSTED,
     PredictedCycle,
     coulomb_friction,
-    first_harmonic,
+    harmonics_of,
     predict_cycles,
 )
 from actuator.linear.model import linearize
@@ -125,4 +125,4 @@ def _at_load(point: OperatingPoint) -> float:
 def _harmonics(orbit: PeriodicOrbit) -> np.ndarray:
     """Amplitudes of the harmonics of the load's speed, (9,)."""
     speed = orbit.signals(["load_speed"])["load_speed"]
-    return np.abs(first_harmonic(orbit.times, speed, 1 / orbit.period))
+    return np.abs(harmonics_of(orbit.times, speed, 1 / orbit.period))

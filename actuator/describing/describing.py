@@ -22,6 +22,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from actuator.actuator import Actuator
+from actuator.simulation.fourier import fourier_coefficients
 from actuator.simulation.run import Run
 from actuator.simulation.signals import Constant, Sine, Sum
 from actuator.simulation.simulate import simulate
@@ -48,11 +49,9 @@ def backlash(gap: float) -> Describing:
     )
 
 
-def first_harmonic(time: np.ndarray, signal: np.ndarray, frequency: float, count: int = HARMONICS) -> np.ndarray:
-    """Complex amplitudes of the harmonics 1 to `count` of one period, c_k in Im(c_k exp(j k w t)), (count,)."""
-    angle = 2 * np.pi * frequency * (time - time[0])
-    weights = [np.trapezoid(signal * np.exp(-1j * k * angle), time) for k in range(1, count + 1)]
-    return 2j * np.array(weights) / (time[-1] - time[0])
+def harmonics_of(time: np.ndarray, signal: np.ndarray, frequency: float) -> np.ndarray:
+    """Complex amplitudes of the harmonics of a period, c_k in Im(c_k exp(j k w t)), (HARMONICS,)."""
+    return 1j * fourier_coefficients(time - time[0], signal[None], frequency, HARMONICS)[0, 1:]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,7 +118,7 @@ def stage_response(  # noqa: PLR0913 - what the response depends on
         compiled=compiled,
     )
     last = run.t >= SETTLING * period * (1 - 1e-9)
-    harmonics = first_harmonic(run.t[last], run[output][last], frequency)
+    harmonics = harmonics_of(run.t[last], run[output][last], frequency)
     first = abs(harmonics[0])
     distortion = float(np.linalg.norm(harmonics[1:]) / first) if first > 0 else float("inf")
     function = complex(harmonics[0] / amplitude)
@@ -239,6 +238,6 @@ def _distortion(
     time = np.linspace(0, 2 * np.pi / frequency, POINTS + 1)
     sine = amplitude * np.sin(frequency * time)
     answer = np.sign(sine) if nonlinearity is None else nonlinearity(sine)
-    harmonics = first_harmonic(time, answer, frequency / (2 * np.pi))
+    harmonics = harmonics_of(time, answer, frequency / (2 * np.pi))
     back = [abs(h * complex(loop(1j * k * frequency))) for k, h in enumerate(harmonics, start=1)]
     return float(np.linalg.norm(back[1:]) / back[0])

@@ -23,7 +23,7 @@ from actuator.plots.style import colors_over, legend_below, shown_as, words_of
 
 if TYPE_CHECKING:
     from actuator.response.frequency_response import FrequencyResponse
-    from actuator.response.record import Spectrum
+    from actuator.response.spectra import Spectrum
     from actuator.response.stiffness import DynamicStiffness
 
 CLEAR = 0.9  # coherence from which a spectrum is shown over others

@@ -16,11 +16,12 @@ from actuator.response.sine import SinePoint, SineResponse, SineStream
 from actuator.simulation.many import run_many
 from actuator.system.hybrid import HybridSystem
 from gear.lubrication.lubricant import at_temperature
+from gear.quantities.roles import NodeTemperature, OilTemperature
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from actuator.response.record import Spectrum
+    from actuator.response.spectra import Spectrum
 
 DIMENSIONS = ("set", "load", "amplitude", "frequency")
 SAME = 1e-6  # relative difference of two numbers on an axis that are one
@@ -287,9 +288,10 @@ def temperature_sets(actuator: Actuator, temperatures: Sequence[float]) -> dict[
     ValueError
         Where nothing depends on the temperature, or it is out of the range of an oil.
     """
-    before = {parameter.name: parameter.default for parameter in actuator.system().parameters}
-    oils = any(name.startswith("gear.") and name.endswith(".temperature") for name in before)
-    nodes = [name for name in before if name.startswith("thermal.nodes.") and name.endswith(".temperature")]
+    system = actuator.system()
+    before = {parameter.name: parameter.default for parameter in system.parameters}
+    oils = system.parameters_having(OilTemperature)
+    nodes = [parameter.name for parameter in system.parameters_having(NodeTemperature)]
     found = {}
     for temperature in temperatures:
         changes = dict.fromkeys(nodes, float(temperature))

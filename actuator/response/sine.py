@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from actuator.actuator import Actuator
-from actuator.response.fourier import fourier
 from actuator.simulation.engine import Engine, engine
 from actuator.simulation.failures import SimulationError
+from actuator.simulation.fourier import fourier_coefficients
 from actuator.simulation.prepared import EngineOptions
 from actuator.simulation.signals import Constant, Signal, Sine, piece_at
 from actuator.simulation.window_points import join
-from actuator.stiction.standstill import find_rest, middle, slowest_constant, soaked
+from actuator.stiction.standstill import find_rest, mean_state, slowest_constant, soak_nodes
 from actuator.system.contact_modes import BACKWARD, FORWARD, find_standstill, label_rows
 from actuator.system.hybrid import HybridSystem
 from gear.quantities import require_known
@@ -175,9 +175,11 @@ class SineStream:
         rest, sliding = find_rest(self.plant, point.inputs, point.parameters)
         constant = slowest_constant(sliding[0]) if sliding else 0.0
         x, m = (
-            (rest.x, rest.m) if rest is not None else (middle(self.system, sliding), np.zeros(len(self.system.modes)))
+            (rest.x, rest.m)
+            if rest is not None
+            else (mean_state(self.system, sliding), np.zeros(len(self.system.modes)))
         )
-        return soaked(self.system, x, point.parameters), m, constant
+        return soak_nodes(self.system, x, point.parameters), m, constant
 
     def measure(self, point: SinePoint) -> SineResponse:
         """Run a sine until two measurements in a row agree, and measure.
@@ -325,7 +327,7 @@ class _Stream:
         weights = np.gradient(window.time)
         return _Block(
             # the input is a cosine: its phase is that of time
-            amplitudes=fourier(window.time, values, frequency, stream.harmonics),
+            amplitudes=fourier_coefficients(window.time, values, frequency, stream.harmonics),
             swing=np.ptp(values, axis=1),
             slides=any(slides) or not slides,
             stuck=float(weights[find_standstill(labels)].sum() / weights.sum()) if labels else 0.0,

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 BLOCK = 1e6  # N m that a blocked shaft holds
 
 
-def unpowered(actuator: Actuator) -> Actuator:
+def remove_drive(actuator: Actuator) -> Actuator:
     """The same actuator with its motor switched off: open circuit, no torque, its inertia on the input shaft.
 
     Raises
@@ -31,7 +31,7 @@ def unpowered(actuator: Actuator) -> Actuator:
     motor, gear = actuator.motor, actuator.gear
     if motor.has_rotor_torque():
         raise ValueError(
-            f"{actuator.name}: unpowered has no place for the cogging and drag of a rotor; put its drag into a bearing "
+            f"{actuator.name}: remove_drive has no place for the cogging and drag of a rotor; put its drag into a bearing "
             f"of the shaft {gear.input!r}, and leave them out of the motor"
         )
     shaft = gear.shafts[gear.input]
@@ -45,9 +45,9 @@ def unpowered(actuator: Actuator) -> Actuator:
     )
 
 
-def locked(actuator: Actuator) -> Actuator:
+def block_motor(actuator: Actuator) -> Actuator:
     """The same actuator, unpowered, with its motor shaft blocked: for the play and the stiffness of the gear alone."""
-    loose = unpowered(actuator)
+    loose = remove_drive(actuator)
     gear = loose.gear
     others = {name: bearing for name, bearing in gear.bearings.items() if bearing.shaft != gear.input}
     block = Brake(shaft=gear.input, torque=BLOCK)
@@ -110,7 +110,7 @@ def dynamic_stiffness(
 ) -> DynamicStiffness:
     """Sines of torque on the load, of every amplitude [N m] and frequency [Hz].
 
-    Of an actuator with its controller, or of `unpowered(actuator)`.
+    Of an actuator with its controller, or of `remove_drive(actuator)`.
 
     Parameters
     ----------

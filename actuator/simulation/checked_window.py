@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from actuator.simulation.failures import inconsistent, stopped
+from actuator.simulation.failures import explain_inconsistent_modes, explain_stop
 from actuator.simulation.mode_code import LOG_SLOTS
 from actuator.simulation.prepared import Prepared, called
 from actuator.simulation.signals import Piece
@@ -33,7 +33,7 @@ def checked_window(
     if failure:
         if length / 2 < FINEST_WINDOW:
             # compiled code fails without a word; the interpreter knows why
-            raise stopped(machine.system, time, m, called(machine.window.interpreted, arguments)[1] or failure)
+            raise explain_stop(machine.system, time, m, called(machine.window.interpreted, arguments)[1] or failure)
         first = part(time, time + length / 2, x, m)
         return join([first, part(time + length / 2, time + length, *first.end)])
 
@@ -68,6 +68,6 @@ def _settled(machine: Prepared, window: Window, k: int, p: np.ndarray, pieces: l
     u = np.array([piece(time - window.time[0]) for piece in pieces])
     state, modes = machine.settle(time, x, m, u, p)
     if np.array_equal(modes, m):
-        raise inconsistent(machine.system, time, modes)
+        raise explain_inconsistent_modes(machine.system, time, modes)
     head = window.until(k)._replace(events=[*window.events, (time, tuple(int(mode) for mode in modes))], settled=1)
     return join([head, part(time, window.time[-1], state, modes)])

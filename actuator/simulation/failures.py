@@ -24,27 +24,31 @@ class InconsistentModes(SimulationError):
     """No combination of modes satisfies all contacts at once."""
 
 
-def stopped(system: HybridSystem, time: float, modes: Sequence[float] | np.ndarray, reason: str) -> SimulationError:
+def explain_stop(
+    system: HybridSystem, time: float, modes: Sequence[float] | np.ndarray, reason: str
+) -> SimulationError:
     """The integrator gave up at a time, for a reason in its own words."""
     named = {name: int(mode) for name, mode in zip(system.modes, modes, strict=True)}
     kind = Chattering if "max_events" in reason else SimulationError
     return kind(
-        f"{system.name}: the run cannot go on after t = {time:.9g} s ({reason}); the modes there are {_told(named)}",
+        f"{system.name}: simulation stopped at t = {time:.9g} s: {reason}; contact modes {_describe(named)}",
         time,
         named,
     )
 
 
-def inconsistent(system: HybridSystem, time: float, modes: Sequence[float] | np.ndarray) -> InconsistentModes:
+def explain_inconsistent_modes(
+    system: HybridSystem, time: float, modes: Sequence[float] | np.ndarray
+) -> InconsistentModes:
     """The decision of the modes failed at a time; `modes` are those it tried last."""
     named = {name: int(mode) for name, mode in zip(system.modes, modes, strict=True)}
     return InconsistentModes(
-        f"{system.name}: no combination of contact modes is consistent at t = {time:.9g} s; the last tried is "
-        f"{_told(named)}. Does friction jam the train?",
+        f"{system.name}: no consistent contact modes at t = {time:.9g} s; last candidate {_describe(named)}; "
+        "check for self-locking",
         time,
         named,
     )
 
 
-def _told(modes: dict[str, int]) -> str:
+def _describe(modes: dict[str, int]) -> str:
     return ", ".join(f"{name} = {mode}" for name, mode in modes.items())

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from actuator.simulation.compiled import compiled_where_wanted
-from actuator.simulation.failures import inconsistent
+from actuator.simulation.failures import explain_inconsistent_modes
 from actuator.simulation.input_form import InputForm
 from actuator.simulation.mode_code import ModeCode
 from actuator.simulation.window import INTERVALS, ticks_function, window_function
@@ -92,7 +92,7 @@ class Prepared:
         state, modes, fault = self.system.reset(np.zeros(len(self.system.margin_names)), x, m, u, p)
         modes = np.round(modes.full().ravel())
         if float(fault):
-            raise inconsistent(self.system, time, modes)
+            raise explain_inconsistent_modes(self.system, time, modes)
         return state.full().ravel(), modes
 
     def logged(
@@ -103,7 +103,7 @@ class Prepared:
         for tau, packed in reversed(list(zip(times, codes.reshape(-1, self.code.size), strict=False))):
             modes = self.code.words(packed)
             if tau < 0:  # a fault, with its time below minus one
-                raise inconsistent(self.system, time + length * (-1 - tau), np.array(modes))
+                raise explain_inconsistent_modes(self.system, time + length * (-1 - tau), np.array(modes))
             found.append((time + length * tau, modes))
         return found
 

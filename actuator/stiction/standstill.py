@@ -9,11 +9,12 @@ from actuator.linear.model import linearize
 from actuator.linear.operating_point import NoEquilibrium, OperatingPoint
 from actuator.linear.trim import trim
 from actuator.system.hybrid import HybridSystem
+from gear.quantities.roles import NodeTemperature, ShaftAngle
 
 SLOWEST = 1e-6  # part of the fastest pole below which a pole never decays
 
 
-def rest_of(
+def rest_state(
     plant: Actuator | HybridSystem,
     inputs: Mapping[str, float] | None = None,
     parameters: Mapping[str, float] | None = None,
@@ -24,7 +25,7 @@ def rest_of(
     """
     system = plant.system() if isinstance(plant, Actuator) else plant
     rest, sliding = find_rest(plant, inputs or {}, parameters or {})
-    x = soaked(system, middle(system, sliding) if rest is None else rest.x, parameters or {})
+    x = soak_nodes(system, mean_state(system, sliding) if rest is None else rest.x, parameters or {})
     return dict(zip([quantity.name for quantity in system.states], x.tolist(), strict=True))
 
 
@@ -37,10 +38,9 @@ def find_rest(
     near = {}
     if isinstance(plant, Actuator):
         # all shafts where the reference is: an integrator that has no gain would hold any other angle
-        angles = {
-            f"{shaft}.angle": turns * inputs.get("reference", 0.0) for shaft, turns in plant.gear.speed_ratios().items()
-        }
-        near = {name: float(angle) for name, angle in angles.items() if name in names}
+        turns, reference = plant.gear.speed_ratios(), inputs.get("reference", 0.0)
+        angles = {state.name: state.role(ShaftAngle) for state in system.states}
+        near = {name: float(turns[role.shaft] * reference) for name, role in angles.items() if role is not None}
 
     def attempt(word: str, guess: Mapping[str, float]) -> OperatingPoint | None:
         try:
@@ -49,18 +49,18 @@ def find_rest(
             return None
 
     sliding = [found for found in (attempt(word, near) for word in ("forward", "backward")) if found is not None]
-    start = middle(system, sliding) if sliding else system.state_vector(near)
+    start = mean_state(system, sliding) if sliding else system.state_vector(near)
     return attempt("stuck", dict(zip(names, start.tolist(), strict=True))), sliding
 
 
-def soaked(system: HybridSystem, x: np.ndarray, parameters: Mapping[str, float]) -> np.ndarray:
+def soak_nodes(system: HybridSystem, x: np.ndarray, parameters: Mapping[str, float]) -> np.ndarray:
     """The same state with thermal nodes at the temperatures they are given, not warmed by what holds the load."""
-    given = dict(zip([p.name for p in system.parameters], system.parameter_values(parameters), strict=True))
-    names = [quantity.name.replace("thermal.", "thermal.nodes.", 1) + ".temperature" for quantity in system.states]
-    return np.array([given.get(name, value) for name, value in zip(names, x, strict=True)])
+    begun = system.state_vector(p=system.parameter_values(parameters))
+    nodes = np.array([state.role(NodeTemperature) is not None for state in system.states], bool)
+    return np.where(nodes, begun, x)
 
 
-def middle(system: HybridSystem, points: Sequence[OperatingPoint]) -> np.ndarray:
+def mean_state(system: HybridSystem, points: Sequence[OperatingPoint]) -> np.ndarray:
     """Mean state of some points; the initial state of none."""
     return np.mean([point.x for point in points], axis=0) if points else system.state_vector({})
 

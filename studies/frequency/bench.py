@@ -13,17 +13,17 @@ from actuator import (
     SinePoint,
     SineStream,
     back_driving,
+    block_motor,
     free_play,
     hold_test,
-    locked,
     rate_test,
+    remove_drive,
     soak_test,
     staircase_test,
     step_test,
     triangle_test,
-    unpowered,
 )
-from actuator.response.bench.steps import Numbers
+from actuator.response.bench.bench import BenchTest, Numbers
 from studies.findings import png
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def _bench(actuator: Actuator, plan: BenchPlan) -> Bench:
     return Bench(plant=actuator, stroke=plan.stroke, inputs=plan.inputs)
 
 
-def _plotted(test: Any) -> BenchResult:
+def _plotted(test: BenchTest) -> BenchResult:
     return BenchResult(test.numbers, test.plot())
 
 
@@ -108,24 +108,18 @@ def _threshold(actuator: Actuator, plan: BenchPlan) -> BenchResult:
 
 
 def _free_play(actuator: Actuator, plan: BenchPlan) -> BenchResult:
-    found = free_play(locked(actuator), torque=PLAY * plan.torque, inputs=_of_load(plan))
-    numbers = {
-        "free play": (found.width_rad, "rad"),
-        "lost motion": (found.lost_motion_rad, "rad"),
-        "stiffness of the gear": (found.stiffness, "N m/rad"),
-    }
-    return BenchResult(numbers, found.plot())
+    return _plotted(free_play(block_motor(actuator), torque=PLAY * plan.torque, inputs=_of_load(plan)))
 
 
 def _back_driving(actuator: Actuator, plan: BenchPlan) -> BenchResult:
     found: Numbers = {}
     figure, locked_directions = None, []
     for word, sign in (("forward", 1), ("backward", -1)):
-        test = back_driving(unpowered(actuator), highest=sign * plan.torque, inputs=_of_load(plan))
+        test = back_driving(remove_drive(actuator), highest=sign * plan.torque, inputs=_of_load(plan))
         found[f"back-driving torque, {word}"] = (math.inf if test.locks else test.torque, "N m")
         figure = figure or test.plot()
         locked_directions += [word] if test.locks else []
-    directions = " and ".join(locked_directions)
+    directions = " or ".join(locked_directions)
     words = f"not back-driven {directions} up to {plan.torque:.4g} N m" if directions else ""
     return BenchResult(found, figure, words)
 

@@ -17,8 +17,8 @@ from actuator import (
     NoEquilibrium,
     dynamic_stiffness,
     frequency_response,
+    remove_drive,
     torque_speed_curve,
-    unpowered,
 )
 from actuator.simulation.many import run_many
 from actuator.simulation.signals import piece_at
@@ -207,7 +207,7 @@ class _Simulations:
         for word in ("powered", "unpowered"):
             options = self._options(len(PARTS) * len(plan.torque_frequencies))
             try:
-                shaken = self.actuator if word == "powered" else unpowered(self.actuator)
+                shaken = self.actuator if word == "powered" else remove_drive(self.actuator)
             except ValueError as error:
                 missing[f"stiffness, {word}"] = str(error)
                 continue

@@ -14,7 +14,7 @@ from actuator.simulation.many import run_many
 from actuator.simulation.run import Run
 from actuator.simulation.signals import Step
 from actuator.simulation.simulate import simulate
-from actuator.stiction.standstill import rest_of
+from actuator.stiction.standstill import rest_state
 from actuator.system.parameters import Parameter, scaled_breakaway
 from actuator.verdict.verdict import FAILED, REST, Hunting, Verdict, classify, decide
 from studies.cache import fingerprint
@@ -128,7 +128,7 @@ class Bench:
     def stepped(self, trial: Trial) -> tuple[Run, Run, Hunting]:
         """The step from rest, the run that decides (the same, or what follows it), and the verdict."""
         common = {"parameters": trial.parameters, "resolution": RESOLUTION}
-        start = rest_of(self.plant, {"reference": 0.0}, trial.parameters)
+        start = rest_state(self.plant, {"reference": 0.0}, trial.parameters)
         step = Step(time=BEFORE, after=trial.size)
         first = simulate(self.plant, DURATION, inputs={"reference": step}, start=start, **common)
         hunting = classify(first)

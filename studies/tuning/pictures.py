@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from actuator.plots.bode import bode_panels, draw_bode, finish_bode
 from actuator.simulation.signals import Step
 from actuator.simulation.simulate import simulate
-from actuator.stiction.standstill import rest_of
+from actuator.stiction.standstill import rest_state
 from studies.tuning.check import BEFORE
 from studies.tuning.loops import curves_at
 from studies.tuning.measures import worst
@@ -35,7 +35,7 @@ def steps_picture(tuned: Tuned) -> Figure:
             tuned.plant,
             HOLD,
             inputs={"reference": Step(time=BEFORE, after=size)},
-            start=rest_of(tuned.plant, {"reference": 0.0}, parameters),
+            start=rest_state(tuned.plant, {"reference": 0.0}, parameters),
             parameters=parameters,
             resolution=2e-3,
         )

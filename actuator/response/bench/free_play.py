@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuator.actuator import Actuator
+from actuator.response.bench.bench import Numbers
 from actuator.simulation.run import Run
 from actuator.simulation.signals import Ramp, Table
 from actuator.simulation.simulate import simulate
-from actuator.stiction.standstill import rest_of
+from actuator.stiction.standstill import rest_state
 from actuator.system.hybrid import HybridSystem
 
 if TYPE_CHECKING:
@@ -47,6 +48,15 @@ class FreePlay:
     angle: np.ndarray = field(repr=False)
     run: Run = field(repr=False)
 
+    @property
+    def numbers(self) -> Numbers:
+        """By name, with their units."""
+        return {
+            "free play": (self.width_rad, "rad"),
+            "lost motion": (self.lost_motion_rad, "rad"),
+            "stiffness of the gear": (self.stiffness, "N m/rad"),
+        }
+
     def plot(self) -> "Figure":
         """Angle over torque, with both flanks extrapolated."""
         from actuator.plots.bench import plot_free_play
@@ -68,7 +78,7 @@ def free_play(
     Parameters
     ----------
     plant : Actuator or HybridSystem
-        `locked(actuator)` for the play of the gear; with its controller, for what that makes of it.
+        `block_motor(actuator)` for the play of the gear; with its controller, for what that makes of it.
     torque : float
         Largest, on top of what `inputs` has [N m]; it should take up the play and overcome the friction behind it.
     period : float
@@ -89,7 +99,7 @@ def free_play(
         plant,
         times[-1],
         inputs={**(inputs or {}), "load_torque": triangle},
-        start=rest_of(plant, inputs, parameters),
+        start=rest_state(plant, inputs, parameters),
         parameters=parameters,
         resolution=period / 2000,
         compiled=compiled,
@@ -107,7 +117,7 @@ def free_play(
     if not (np.array(slopes) > 0).all() or abs(angle[-1] - ago) > RETURNS * np.ptp(angle):
         raise ValueError(
             f"free_play: the load does not come back, it is {np.degrees(abs(angle[-1] - ago)):.3g} deg farther in "
-            "every cycle of the torque; block the motor (`locked`), or use less torque"
+            "every cycle of the torque; block the motor (`block_motor`), or use less torque"
         )
     middle = [np.interp(0.0, *_sorted(pushed[part], angle[part])) for part in (rising, ~rising)]
     return FreePlay(
@@ -148,6 +158,11 @@ class BackDriving:
         """Whether the motor stands up to the highest torque."""
         return math.isinf(self.torque)
 
+    @property
+    def numbers(self) -> Numbers:
+        """By name, with their units."""
+        return {"back-driving torque": (self.torque, "N m")}
+
     def plot(self) -> "Figure":
         """Motion of motor and load over the torque."""
         from actuator.plots.bench import plot_back_driving
@@ -169,7 +184,7 @@ def back_driving(
     Parameters
     ----------
     plant : Actuator or HybridSystem
-        Mostly `unpowered(actuator)`.
+        Mostly `remove_drive(actuator)`.
     highest : float
         At which the ramp ends [N m], with a sign.
     duration : float
@@ -183,7 +198,7 @@ def back_driving(
         plant,
         duration,
         inputs={**(inputs or {}), "load_torque": ramp},
-        start=rest_of(plant, inputs, parameters),
+        start=rest_state(plant, inputs, parameters),
         parameters=parameters,
         resolution=duration / 4000,
         compiled=compiled,

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from actuator.response.bench.steps import LEAD, Bench, Numbers, StepResponse, step_test
+from actuator.response.bench.bench import Bench, Numbers
+from actuator.response.bench.steps import LEAD, StepResponse, step_test
 from actuator.simulation.run import Run
 from actuator.simulation.signals import Ramp, Step
 from actuator.verdict.verdict import Hunting, classify

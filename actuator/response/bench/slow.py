@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from actuator.response.bench.steps import Bench, Numbers
+from actuator.response.bench.bench import Bench, Numbers
 from actuator.simulation.run import Run
 from actuator.simulation.signals import Table
 

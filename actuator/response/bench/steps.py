@@ -1,21 +1,15 @@
-"""Virtual bench tests, what a test engineer does to an actuator and writes down: the bench itself, and steps.
-
-Each test returns a frozen result: its numbers with units by name (`numbers`), the runs behind them, and a picture.
-"""
+"""Step responses of several sizes: overshoot, rise and settling time, error left."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from actuator.actuator import Actuator
+from actuator.response.bench.bench import Bench, Numbers
 from actuator.simulation.run import Run
-from actuator.simulation.signals import Constant, Signal, Step
-from actuator.simulation.simulate import simulate
-from actuator.stiction.standstill import rest_of
-from actuator.system.hybrid import HybridSystem
+from actuator.simulation.signals import Step
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,54 +18,6 @@ STEP_SIZES = (0.005, 0.02, 0.1, 1.0)  # parts of the stroke
 BAND = 0.02  # part of a step within which it has settled
 LOW, HIGH = 0.1, 0.9  # parts of a step between which it rises
 LEAD = 0.05  # s of rest before a step
-
-Numbers = dict[str, tuple[float, str]]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Bench:
-    """An actuator on the bench, with what stays the same in all tests.
-
-    Parameters
-    ----------
-    plant : Actuator or HybridSystem
-        With a position controller.
-    stroke : float
-        From end to end [rad].
-    inputs : mapping of str to float
-        Other inputs, constant: a bias load, say.
-    parameters : mapping of str to float
-        That differ from the defaults: those of a temperature, say.
-    compiled : bool or None
-        As for `simulate`.
-    """
-
-    plant: Actuator | HybridSystem
-    stroke: float
-    inputs: Mapping[str, float] = field(default_factory=dict)
-    parameters: Mapping[str, float] = field(default_factory=dict)
-    compiled: bool | None = None
-
-    def __post_init__(self) -> None:
-        if not self.stroke > 0:
-            raise ValueError(f"Bench.stroke must be > 0 rad, got {self.stroke:g} rad")
-
-    def run(
-        self, reference: Signal, duration: float, resolution: float, more: Mapping[str, Signal] | None = None
-    ) -> Run:
-        """From rest at the reference's first value."""
-        first = reference.pieces()[0][1].offset
-        start = rest_of(self.plant, {**self.inputs, "reference": first}, self.parameters)
-        signals: dict[str, Signal] = {name: Constant(value=value) for name, value in self.inputs.items()}
-        return simulate(
-            self.plant,
-            duration,
-            inputs={**signals, "reference": reference, **(more or {})},
-            start=start,
-            parameters=self.parameters,
-            resolution=resolution,
-            compiled=self.compiled,
-        )
 
 
 @dataclass(frozen=True, kw_only=True)

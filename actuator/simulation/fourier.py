@@ -5,7 +5,7 @@ import numpy as np
 WHOLE = 1e-6  # part of the time within which periods are whole
 
 
-def fourier(time: np.ndarray, values: np.ndarray, frequency: float, harmonics: int) -> np.ndarray:
+def fourier_coefficients(time: np.ndarray, values: np.ndarray, frequency: float, harmonics: int) -> np.ndarray:
     """Complex amplitudes c[k] of a signal over whole periods, from its mean to its last harmonic.
 
         values = c[0] + sum over k >= 1 of Re(c[k] exp(j 2 pi k frequency time))
@@ -34,7 +34,9 @@ def fourier(time: np.ndarray, values: np.ndarray, frequency: float, harmonics: i
     length = time[-1] - time[0]
     periods = length * frequency
     if round(periods) < 1 or abs(periods - round(periods)) > WHOLE * periods:
-        raise ValueError(f"fourier needs whole periods of {frequency:g} Hz, got {length:g} s, {periods:.9g} of them")
+        raise ValueError(
+            f"fourier_coefficients needs whole periods of {frequency:g} Hz, got {length:g} s, {periods:.9g} of them"
+        )
     order = np.arange(harmonics + 1)
     waves = np.exp(-2j * np.pi * frequency * order[:, None] * time)
     sums = np.trapezoid(values[:, None, :] * waves, time, axis=-1) / length

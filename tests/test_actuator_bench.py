@@ -308,6 +308,7 @@ def test_the_free_play_of_a_blocked_drive_is_its_gap_less_what_friction_bends(ga
     assert found.width_rad == pytest.approx(gap - 2 * friction / SPRING, rel=0.02)
     assert found.lost_motion_rad == pytest.approx(gap + 2 * friction / SPRING, rel=0.02)
     assert found.stiffness == pytest.approx(SPRING, rel=0.01)
+    assert found.numbers["free play"] == (found.width_rad, "rad")
     assert "free play" in found.plot().axes[0].get_title()
 
 
@@ -327,7 +328,7 @@ def test_a_drive_is_driven_back_by_the_friction_of_both_sides(sign):
 def test_a_drive_that_is_not_driven_back_locks():
     found = back_driving(remove_drive(geared()), highest=1.4, compiled=False)
     assert found.locks
-    assert found.torque == math.inf
+    assert found.numbers == {"back-driving torque": (math.inf, "N m")}
     assert "locks up to 1.4 N m" in found.plot().axes[0].get_title()
 
 

@@ -290,7 +290,7 @@ def test_it_is_said_up_to_which_torque_the_one_that_drives_back_was_sought():
     actuator = load_case("aileron").actuator
     plan = BenchPlan(stroke=1.0, torque=1.0, frequencies=(1.0,), sets={}, inputs={})
     found = TESTS["back driving"](actuator, plan)
-    assert found.words == "not back-driven forward and backward up to 1 N m"
+    assert found.words == "not back-driven forward or backward up to 1 N m"
     assert all(math.isinf(value) for value, _ in found.numbers.values())
 
 

@@ -174,11 +174,10 @@ class SineStream:
     def _at_rest(self, point: SinePoint) -> tuple[np.ndarray, np.ndarray, float]:
         rest, sliding = find_rest(self.plant, point.inputs, point.parameters)
         constant = slowest_constant(sliding[0]) if sliding else 0.0
-        x, m = (
-            (rest.x, rest.m)
-            if rest is not None
-            else (mean_state(self.system, sliding), np.zeros(len(self.system.modes)))
-        )
+        if rest is None:
+            x, m = mean_state(self.system, sliding), np.zeros(len(self.system.modes))
+        else:
+            x, m = rest.x, rest.m
         return soak_nodes(self.system, x, point.parameters), m, constant
 
     def measure(self, point: SinePoint) -> SineResponse:

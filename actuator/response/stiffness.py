@@ -31,8 +31,8 @@ def remove_drive(actuator: Actuator) -> Actuator:
     motor, gear = actuator.motor, actuator.gear
     if motor.has_rotor_torque():
         raise ValueError(
-            f"{actuator.name}: remove_drive has no place for the cogging and drag of a rotor; put its drag into a bearing "
-            f"of the shaft {gear.input!r}, and leave them out of the motor"
+            f"{actuator.name}: remove_drive has no place for the cogging and drag of a rotor; put its drag into a "
+            f"bearing of the shaft {gear.input!r}, and leave them out of the motor"
         )
     shaft = gear.shafts[gear.input]
     heavier = replace(shaft, inertia=shaft.inertia + motor.rotor_inertia())

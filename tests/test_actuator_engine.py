@@ -187,7 +187,9 @@ def faulty(**states):
 
 @pytest.mark.parametrize("resolution", [1e-3, 1e-2])
 def test_inconsistent_modes_are_reported_with_their_time(resolution):
-    with pytest.raises(InconsistentModes, match=r"jammed: no combination .* contact0.motion = 0") as caught:
+    with pytest.raises(
+        InconsistentModes, match=r"jammed: no consistent contact modes .* contact0.motion = 0"
+    ) as caught:
         simulate(faulty(), 1.0, start={"x0": 0.3}, compiled=False, resolution=resolution)
     assert caught.value.modes == {"contact0.motion": 0}
     assert caught.value.time == pytest.approx(0.3, abs=resolution)
@@ -202,7 +204,7 @@ def test_inconsistent_modes_at_the_start_are_reported_at_time_zero():
 def test_a_state_that_grows_beyond_all_bounds_is_not_returned_as_a_result():
     # x' = x^2 from 1e4 is infinite at 1e-4 s
     system = hybrid(flow=lambda x, m, u, p: [x[0] ** 2], margins=lambda x, m, u, p: [], reset=kept, modes=0)
-    with pytest.raises(SimulationError, match="cannot go on") as caught:
+    with pytest.raises(SimulationError, match="simulation stopped") as caught:
         simulate(system, 2e-4, start={"x0": 1e4}, compiled=False)
     assert caught.value.time == pytest.approx(1e-4, abs=1e-6)
 

@@ -425,7 +425,7 @@ def test_a_run_that_cannot_be_completed_is_told_in_one_line_and_nothing_is_writt
     outcome = invoke(case_file(text), "--out", tmp_path / "out")
     assert outcome.exit_code != 0
     assert isinstance(outcome.exception, SystemExit), repr(outcome.exception)
-    assert "cannot go on" in outcome.output
+    assert "simulation stopped" in outcome.output
     assert list((tmp_path / "out").iterdir()) == []
 
 

@@ -130,9 +130,9 @@ class _Assembly:
         for name in PARTS:
             parts[name], found = parameterize(getattr(actuator, name), name)
             parameters += found
-        book = SystemBuilder()
-        heat = HeatFlow(book, parts["thermal"])
-        gear: Transmission = heat.oiled(parts["gear"])
+        builder = SystemBuilder()
+        heat = HeatFlow(builder, parts["thermal"])
+        gear: Transmission = heat.warm_oils(parts["gear"])
         kinematics = actuator.gear.kinematics(gear)
         symbols = [
             {shaft: ca.SX.sym(f"{shaft}.{what}") for shaft in kinematics.independent} for what in ("angle", "speed")
@@ -153,9 +153,9 @@ class _Assembly:
         contacts = ContactMechanics(gear, actuator.gear.redundant(), kinematics, inertia, memory)
 
         names = () if actuator.controller is None else actuator.controller.loops()
-        loops, due = build_loops(book, names, parts["sampling"], actuator.sampling)
+        loops, due = build_loops(builder, names, parts["sampling"], actuator.sampling)
         context = DriveContext(
-            builder=book,
+            builder=builder,
             parts=parts,
             motion=motion,
             loops=loops,
@@ -163,11 +163,11 @@ class _Assembly:
             oil_or_housing=heat.of_oil(),
         )
         torque = dict.fromkeys(gear.shafts, ca.SX(0))
-        motor_torque, load_torque = context.drive(), self._load_torque(book, parts["load"], motion)
+        motor_torque, load_torque = context.drive(), self._load_torque(builder, parts["load"], motion)
         torque[gear.input] += motor_torque
         torque[gear.output] += load_torque
-        book.output("motor_torque", "N m", motor_torque)
-        book.output("total_load_torque", "N m", load_torque)
+        builder.output("motor_torque", "N m", motor_torque)
+        builder.output("total_load_torque", "N m", load_torque)
 
         m = ca.SX.sym("m", len(contacts.mode_variables()))
         modes = contacts.modes(m)
@@ -178,52 +178,52 @@ class _Assembly:
         ):
             for shaft, symbol in known.items():
                 owner = f"shaft {shaft}"
-                book.state(symbol.name(), unit, nominal, symbol=symbol, roles=(role(shaft),), owner=owner)
-                book.rate(symbol.name(), rates[shaft])
+                builder.state(symbol.name(), unit, nominal, symbol=symbol, roles=(role(shaft),), owner=owner)
+                builder.rate(symbol.name(), rates[shaft])
         for path, law in creeping.items():
             more = {"roles": (FrictionMemory(f"gear.{path}"),), "owner": f"{type(law).__name__} of gear.{path}"}
             for kept, symbol, rate in zip(law.memory(), memory[path], forces.by_memory[path][1], strict=True):
-                book.state(symbol.name(), kept.unit, kept.nominal, initial=kept.initial, symbol=symbol, **more)
-                book.rate(symbol.name(), rate)
+                builder.state(symbol.name(), kept.unit, kept.nominal, initial=kept.initial, symbol=symbol, **more)
+                builder.rate(symbol.name(), rate)
         seen = Mechanics(contacts, forces, modes, angle, speed, torque)
-        observe(book, seen, motion)
+        observe(builder, seen, motion)
         context.losses.update(seen.losses())
         for name, loss in context.losses.items():
-            book.output(f"{name}_loss", "W", loss, Heat(name))
+            builder.output(f"{name}_loss", "W", loss, Heat(name))
         heat.feed(context.losses)
 
-        arguments = [book.x(), m, book.u(), ca.vertcat(*(parameter.symbol for parameter in parameters))]
+        arguments = [builder.x(), m, builder.u(), ca.vertcat(*(parameter.symbol for parameter in parameters))]
         fired = ca.SX.sym("fired", len(contacts.events()))
         settle = contacts.reset_function("settle", arguments, fired, angle, speed, torque, m)
         clocks = _clocks(actuator.sampling)
         self.system = HybridSystem(
             name=actuator.name,
-            states=book.states,
+            states=builder.states,
             mode_variables=tuple(contacts.mode_variables()),
-            inputs=book.inputs,
-            outputs=book.outputs,
+            inputs=builder.inputs,
+            outputs=builder.outputs,
             events=tuple(contacts.events()),
             parameters=tuple(parameters),
             contacts=tuple(contacts.records(_travel(actuator.gear))),
-            flow=ca.Function("flow", arguments, [book.flow()], SHARED),
+            flow=ca.Function("flow", arguments, [builder.flow()], SHARED),
             contact_state=ca.Function("contact_state", arguments, contacts.state(forces), SHARED),
             margins=ca.Function("margins", arguments, [contacts.margins(forces, modes)], SHARED),
-            reset=_whole_reset(settle, arguments, [state.name for state in book.states], list(symbols[1].values())),
+            reset=_whole_reset(settle, arguments, [state.name for state in builder.states], list(symbols[1].values())),
             check=lambda values: _check_values(actuator, values),
-            outputs_function=ca.Function("outputs", arguments, [book.y()], SHARED),
+            outputs_function=ca.Function("outputs", arguments, [builder.y()], SHARED),
             clocks=clocks,
-            tick=ca.Function("tick", [due, *arguments], [book.after_tick()]) if clocks else None,
+            tick=ca.Function("tick", [due, *arguments], [builder.after_tick()]) if clocks else None,
             period=ca.Function("period", arguments[3:], [parts["sampling"].base]) if clocks else None,
-            begin=book.begin(arguments[3]),
+            begin=builder.begin(arguments[3]),
         )
 
-    def _load_torque(self, book: SystemBuilder, load: Any, motion: PlantMotion) -> ca.SX:
+    def _load_torque(self, builder: SystemBuilder, load: Any, motion: PlantMotion) -> ca.SX:
         """Of the load itself and from outside, as a torque on the output shaft."""
-        at, outside = (motion.load_angle, motion.load_speed), book.input("load_torque", "N m")
-        own = () if load.own_input is None else (book.input(*load.own_input),)
+        at, outside = (motion.load_angle, motion.load_speed), builder.input("load_torque", "N m")
+        own = () if load.own_input is None else (builder.input(*load.own_input),)
         for name, (unit, value) in load.signals(*at).items():
-            book.output(name, unit, value)
-        book.output("load_power", "W", load.power(*at, *own) - outside * motion.load_speed)
+            builder.output(name, unit, value)
+        builder.output("load_power", "W", load.power(*at, *own) - outside * motion.load_speed)
         return load.torque(*at, *own) + outside
 
 

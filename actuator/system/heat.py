@@ -63,18 +63,18 @@ class HeatFlow:
         """Of the oil, or else of the housing it is in."""
         return self._of("oil", "housing")
 
-    def oiled(self, gear: Any) -> Any:
+    def warm_oils(self, gear: Any) -> Any:
         """The gear with its oils at the temperature of the network's oil, where it has that node."""
         oil = self._of("oil")
         if oil is None:
             return gear
 
-        def warmed(part: Any) -> Any:
+        def warm(part: Any) -> Any:
             own = oil_temperatures(part)
             values = {field.name: oil if field.name in own else getattr(part, field.name) for field in fields(part)}
             return unchecked(type(part), **values) if own else None
 
-        return substituted(gear, warmed, keep=(MEASURED,))
+        return substituted(gear, warm, keep=(MEASURED,))
 
     def feed(self, losses: Mapping[str, Scalar]) -> None:
         """The losses [W] into the network's nodes."""

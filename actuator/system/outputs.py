@@ -60,32 +60,32 @@ class Mechanics(NamedTuple):
         }
 
 
-def observe(book: SystemBuilder, seen: Mechanics, motion: PlantMotion) -> None:
+def observe(builder: SystemBuilder, seen: Mechanics, motion: PlantMotion) -> None:
     """Motion of motor and load, slip, friction and loss of every contact, loads of every mesh, energy."""
     contacts, forces = seen.contacts, seen.forces
     gear = contacts.gear
     for side in ("motor", "load"):
-        book.output(f"{side}_angle", "rad", getattr(motion, f"{side}_angle"))
-        book.output(f"{side}_speed", "rad/s", getattr(motion, f"{side}_speed"))
-    book.output("motor_angle_at_load", "rad", motion.motor_angle / motion.ratio)
+        builder.output(f"{side}_angle", "rad", getattr(motion, f"{side}_angle"))
+        builder.output(f"{side}_speed", "rad/s", getattr(motion, f"{side}_speed"))
+    builder.output("motor_angle_at_load", "rad", motion.motor_angle / motion.ratio)
     friction: dict[str, ca.SX] = {}
     lost = seen.friction_losses()
     for contact, slip, scalar in seen.rubbing():
         unit = ("m/s", "N") if contact.place == Place.MESH else ("rad/s", "N m")
-        book.output(f"gear.{contact.name}.slip_speed", unit[0], slip)
-        book.output(f"gear.{contact.name}.friction", unit[1], scalar)
-        book.output(f"gear.{contact.name}.friction_loss", "W", lost[contact.name], FrictionHeat(contact.name))
+        builder.output(f"gear.{contact.name}.slip_speed", unit[0], slip)
+        builder.output(f"gear.{contact.name}.friction", unit[1], scalar)
+        builder.output(f"gear.{contact.name}.friction_loss", "W", lost[contact.name], FrictionHeat(contact.name))
         friction[contact.name] = scalar
     rigid = contacts.rigid_forces(forces, seen.torque)
     for name, normal in {**forces.normal, **rigid}.items():
         mesh, path = gear.meshes[name], f"gear.meshes.{name}"
-        book.output(f"{path}.normal_force", "N", normal)
+        builder.output(f"{path}.normal_force", "N", normal)
         if name in forces.motions:
-            book.output(f"{path}.deflection", "m", forces.motions[name].deflection)
+            builder.output(f"{path}.deflection", "m", forces.motions[name].deflection)
         bearing = mesh.bearing_force(normal, friction.get(f"meshes.{name}", 0.0), ca.if_else(normal < 0, -1, 1))
-        book.output(f"{path}.bearing_force_x", "N", bearing.x)
-        book.output(f"{path}.bearing_force_y", "N", bearing.y)
+        builder.output(f"{path}.bearing_force_x", "N", bearing.x)
+        builder.output(f"{path}.bearing_force_y", "N", bearing.y)
     for path, passed in forces.passed.items():
-        book.output(f"gear.{path}.torque", "N m", passed)
-        book.output(f"gear.{path}.twist", "rad", forces.twists[path].angle)
-    book.output("mechanical_energy", "J", seen.energy())
+        builder.output(f"gear.{path}.torque", "N m", passed)
+        builder.output(f"gear.{path}.twist", "rad", forces.twists[path].angle)
+    builder.output("mechanical_energy", "J", seen.energy())

@@ -9,8 +9,8 @@ and the rule. They take parts with numbers, such as those of `examples()`.
 
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import fields, is_dataclass, replace
-from typing import Any, get_type_hints
+from dataclasses import replace
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -28,8 +28,8 @@ from controllers.cascade import Cascade
 from controllers.controller import Controller
 from controllers.countermeasures import StickingCycle
 from controllers.sampling import SERVO_LOOPS, LoopPeriod, Sampling
+from gear.contracts import check_units
 from gear.couplings import Coupling
-from gear.quantities import unit_of
 from gear.quantities.roles import IntegralGain, LoopGain, LoopSignal
 from gear.shafts import Shaft
 from gear.transmission import Transmission
@@ -274,16 +274,6 @@ def sampling_for(controller: Controller) -> Sampling:
 
 
 # -- for all ------------------------------------------------------------------------------------------------
-
-
-def check_units(part: Any) -> None:
-    """Each number of it has a unit, without which no parameter is made of it."""
-    if not is_dataclass(part):
-        raise AssertionError(f"{_name(part)} is no dataclass, so it has no parameters")
-    hints = get_type_hints(type(part))
-    bare = [each.name for each in fields(part) if hints[each.name] in (float, float | None)]
-    bare = [name for name in bare if unit_of(part, name) is None]
-    assert not bare, f"{_name(part)}: {', '.join(bare)} has no unit: declare it, Annotated[float, Unit(...)]"
 
 
 def _name(part: Any) -> str:

@@ -45,6 +45,14 @@ class Coupling(ShaftCoupling):
     damping: TorsionalDamping
     gap: Annotated[float, Unit("rad"), Ge(0), Gap()] | None = None
 
+    @classmethod
+    def examples(cls) -> "tuple[Coupling, ...]":
+        """Between shafts and to the housing, with free play and without."""
+        return (
+            cls(a="a", b="b", stiffness=1e3, damping=1.0),
+            cls(a="a", stiffness=1e3, damping=1.0, gap=0.01),
+        )
+
     def __post_init__(self) -> None:
         check(self)
         if self.a == self.b:

@@ -34,6 +34,11 @@ class EndStop(ShaftStop):
     stiffness: TorsionalStiffness
     damping: TorsionalDamping = 0.0
 
+    @classmethod
+    def examples(cls) -> "tuple[EndStop, ...]":
+        """Stops that are not symmetric."""
+        return (cls(shaft="a", lower=-0.3, upper=0.5, stiffness=1e3, damping=1.0),)
+
     def __post_init__(self) -> None:
         check(self)
         if self.lower >= self.upper:

@@ -6,6 +6,7 @@ from typing import Annotated
 import casadi as ca
 
 from gear.elasticity.law import DEFLECTION_NOMINAL, ElasticityLaw, ToothSpring, pushing
+from gear.elasticity.linear import Linear
 from gear.motion import MeshMotion
 from gear.quantities import Distance, Scalar, check
 from gear.quantities.registry import part
@@ -42,6 +43,11 @@ class Backlash(ElasticityLaw):
 
     gap: Annotated[Distance, Gap()]
     law: ToothSpring
+
+    @classmethod
+    def examples(cls) -> "tuple[Backlash, ...]":
+        """Around each of two springs."""
+        return tuple(cls(gap=2e-5, law=law) for law in Linear.examples())
 
     def __post_init__(self) -> None:
         check(self)
@@ -93,6 +99,11 @@ class BacklashAsPrinted(ElasticityLaw):
 
     gap: Annotated[Distance, Gap()]
     law: ToothSpring
+
+    @classmethod
+    def examples(cls) -> "tuple[BacklashAsPrinted, ...]":
+        """Around each of two springs."""
+        return tuple(cls(gap=2e-5, law=law) for law in Linear.examples())
 
     def __post_init__(self) -> None:
         check(self)

@@ -29,6 +29,11 @@ class Linear(ToothSpring):
     stiffness: Stiffness
     damping: Damping
 
+    @classmethod
+    def examples(cls) -> "tuple[Linear, ...]":
+        """Damped and undamped."""
+        return (cls(stiffness=2e8, damping=2e5), cls(stiffness=1e8, damping=0.0))
+
     def __post_init__(self) -> None:
         check(self)
 

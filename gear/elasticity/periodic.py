@@ -2,7 +2,9 @@
 
 from dataclasses import dataclass
 
+from gear.elasticity.backlash import Backlash
 from gear.elasticity.law import ElasticityLaw
+from gear.elasticity.linear import Linear
 from gear.harmonics import Harmonic, lowest_factor, pitch_of, tooth_factor
 from gear.motion import MeshMotion
 from gear.quantities import Length, Scalar, check
@@ -53,6 +55,13 @@ class PeriodicStiffness(ElasticityLaw):
     law: ElasticityLaw
     harmonics: tuple[Harmonic, ...]
     pitch: Length | None = None
+
+    @classmethod
+    def examples(cls) -> "tuple[PeriodicStiffness, ...]":
+        """Around a spring, and around a gap."""
+        return tuple(
+            cls(law=law, harmonics=(Harmonic(cosine=0.3),)) for law in (*Linear.examples(), *Backlash.examples())
+        )
 
     def __post_init__(self) -> None:
         check(self)

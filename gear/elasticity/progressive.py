@@ -44,6 +44,11 @@ class ProgressiveISO(ToothSpring):
     damping: Damping
     roughness: Length
 
+    @classmethod
+    def examples(cls) -> "tuple[ProgressiveISO, ...]":
+        """Rough flanks."""
+        return (cls(stiffness=2e8, damping=2e3, roughness=5e-6),)
+
     def __post_init__(self) -> None:
         check(self)
 
@@ -106,6 +111,11 @@ class ProgressiveNiemann(ToothSpring):
     nominal_force: Force
     damping: Damping
     initial: Part = 0.546
+
+    @classmethod
+    def examples(cls) -> "tuple[ProgressiveNiemann, ...]":
+        """Ten millimeters wide, nearly."""
+        return (cls(stiffness=2e8, nominal_force=1e3, damping=2e3),)
 
     def __post_init__(self) -> None:
         check(self)

@@ -7,7 +7,9 @@ from typing import Literal
 
 import casadi as ca
 
+from gear.elasticity.backlash import Backlash
 from gear.elasticity.law import ElasticityLaw
+from gear.elasticity.linear import Linear
 from gear.motion import MeshMotion
 from gear.quantities import Angle, Scalar, Share, check, check_count
 from gear.quantities.registry import part
@@ -93,6 +95,14 @@ class ToothFaults(ElasticityLaw):
 
     law: ElasticityLaw
     faults: Mapping[str, ToothFault]
+
+    @classmethod
+    def examples(cls) -> "tuple[ToothFaults, ...]":
+        """A crack, around a spring and around a gap."""
+        return tuple(
+            cls(law=law, faults={"crack": ToothFault(wheel="a", teeth=20, remaining=0.5)})
+            for law in (*Linear.examples(), *Backlash.examples())
+        )
 
     def factor(self, motion: MeshMotion) -> Scalar:
         """Stiffness over that of sound teeth [-]."""

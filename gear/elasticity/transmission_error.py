@@ -6,7 +6,9 @@ from typing import Literal
 
 import casadi as ca
 
+from gear.elasticity.backlash import Backlash
 from gear.elasticity.law import ElasticityLaw
+from gear.elasticity.linear import Linear
 from gear.motion import MeshMotion
 from gear.quantities import Angle, Distance, Scalar, check, check_count
 from gear.quantities.registry import part
@@ -79,6 +81,14 @@ class TransmissionError(ElasticityLaw):
 
     law: ElasticityLaw
     harmonics: Mapping[str, ErrorHarmonic]
+
+    @classmethod
+    def examples(cls) -> "tuple[TransmissionError, ...]":
+        """Once per turn, around a spring and around a gap."""
+        return tuple(
+            cls(law=law, harmonics={"runout": ErrorHarmonic(wheel="a", order=1, amplitude=1e-6)})
+            for law in (*Linear.examples(), *Backlash.examples())
+        )
 
     def shifted(self, motion: MeshMotion) -> MeshMotion:
         """The motion as the teeth feel it."""

@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 
 from gear.friction.law import FrictionLaw, SpeedLaw
+from gear.friction.over_speed import Stribeck
 from gear.lubrication.law import Lubricant
+from gear.lubrication.lubricant import GivenViscosity
 from gear.motion import Sliding
 from gear.quantities import Scalar
 from gear.quantities.registry import part
@@ -38,6 +40,18 @@ class AtViscosity(FrictionLaw):
     law: SpeedLaw
     lubricant: Lubricant
     measured_with: Lubricant
+
+    @classmethod
+    def examples(cls) -> "tuple[AtViscosity, ...]":
+        """Oil twice as thick as that of the measurement."""
+        return tuple(
+            cls(
+                law=law,
+                lubricant=GivenViscosity(viscosity=0.2),
+                measured_with=GivenViscosity(viscosity=0.1),
+            )
+            for law in Stribeck.examples()
+        )
 
     def require_pair(self, pair: Pair) -> None:
         """Raise ValueError where the law has no meaning for the teeth of a pair."""

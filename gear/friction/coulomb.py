@@ -31,6 +31,11 @@ class Coulomb(FrictionLaw):
     sliding: Annotated[Coefficient, SlidingFriction()]
     static: Annotated[Coefficient, Breakaway(floor="sliding")]
 
+    @classmethod
+    def examples(cls) -> "tuple[Coulomb, ...]":
+        """With stiction and without."""
+        return (cls(sliding=0.1, static=0.15), cls(sliding=0.1, static=0.1))
+
     def __post_init__(self) -> None:
         check(self)
         require_breakaway_above("Coulomb", ("sliding", self.sliding), ("static", self.static))

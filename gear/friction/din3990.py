@@ -7,6 +7,7 @@ import casadi as ca
 
 from gear.friction.law import FrictionLaw
 from gear.lubrication.law import Lubricant
+from gear.lubrication.lubricant import GivenViscosity
 from gear.motion import Sliding
 from gear.quantities import Length, PositiveCoefficient, Scalar, Share, check
 from gear.quantities.registry import part
@@ -61,6 +62,11 @@ class Din3990(FrictionLaw):
     roughness: Length
     face_width: Length
     effective_width: Share = 1.0
+
+    @classmethod
+    def examples(cls) -> "tuple[Din3990, ...]":
+        """Teeth of the gear paper."""
+        return (cls(static=0.2, lubricant=GivenViscosity(viscosity=0.275), roughness=8e-7, face_width=0.01),)
 
     def __post_init__(self) -> None:
         check(self)

@@ -69,6 +69,11 @@ class LuGre(FrictionLaw):
 
     sticks: ClassVar[bool] = False
 
+    @classmethod
+    def examples(cls) -> "tuple[LuGre, ...]":
+        """The published numbers for a unit mass, per newton of normal force."""
+        return (cls(sliding=1.0, static=1.5, stribeck_speed=1e-3, stiffness=1e5, damping=1e5**0.5, viscous=0.4),)
+
     def __post_init__(self) -> None:
         check(self)
         require_breakaway_above("LuGre", ("sliding", self.sliding), ("static", self.static))

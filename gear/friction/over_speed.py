@@ -60,6 +60,14 @@ class Stribeck(SpeedLaw):
     exponent: AtLeastOne = 2.0
     viscous: ViscousCoefficient = 0.0
 
+    @classmethod
+    def examples(cls) -> "tuple[Stribeck, ...]":
+        """Gaussian, and exponential with a viscous part."""
+        return (
+            cls(static=0.2, coulomb=0.1, stribeck_speed=0.01),
+            cls(static=0.2, coulomb=0.1, stribeck_speed=0.01, exponent=1.0, viscous=0.05),
+        )
+
     def __post_init__(self) -> None:
         check(self)
         require_breakaway_above("Stribeck", ("coulomb", self.coulomb), ("static", self.static))
@@ -108,6 +116,16 @@ class FrictionTable(SpeedLaw):
 
     points: tuple[FrictionPoint, ...]
     static: Annotated[Coefficient, Breakaway(floor="onset")]
+
+    @classmethod
+    def examples(cls) -> "tuple[FrictionTable, ...]":
+        """Two points."""
+        return (
+            cls(
+                points=(FrictionPoint(speed=0.0, coefficient=0.15), FrictionPoint(speed=1.0, coefficient=0.05)),
+                static=0.2,
+            ),
+        )
 
     def __post_init__(self) -> None:
         check(self)

@@ -3,7 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from gear.friction.coulomb import Coulomb
 from gear.friction.law import FrictionLaw
+from gear.friction.lugre import LuGre
 from gear.harmonics import Harmonic, lowest_factor, pitch_of, tooth_factor
 from gear.motion import Sliding
 from gear.quantities import Length, Memory, Scalar, check
@@ -44,6 +46,13 @@ class PeriodicFriction(FrictionLaw):
     law: FrictionLaw
     harmonics: tuple[Harmonic, ...]
     pitch: Length | None = None
+
+    @classmethod
+    def examples(cls) -> "tuple[PeriodicFriction, ...]":
+        """Around a law that sticks, and around one that does not."""
+        return tuple(
+            cls(law=law, harmonics=(Harmonic(cosine=0.2),)) for law in (*Coulomb.examples(), *LuGre.examples())
+        )
 
     def __post_init__(self) -> None:
         check(self)

@@ -65,6 +65,11 @@ class TabulatedEfficiency(SpeedLaw):
     points: tuple[EfficiencyPoint, ...]
     breakout: Annotated[AtLeastOne, Breakaway(floor=1.0)] = 1.0
 
+    @classmethod
+    def examples(cls) -> "tuple[TabulatedEfficiency, ...]":
+        """One efficiency, with breakout."""
+        return (cls(points=(EfficiencyPoint(speed=0.0, a_drives=0.9, b_drives=0.85),), breakout=1.5),)
+
     def __post_init__(self) -> None:
         check(self)
         require_axis("TabulatedEfficiency", [point.speed for point in self.points])

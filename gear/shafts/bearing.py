@@ -5,6 +5,7 @@ from typing import Annotated
 
 from gear.friction.law import require_breakaway_above
 from gear.lubrication.drag import Palmgren, Thickening
+from gear.lubrication.lubricant import GivenViscosity
 from gear.quantities import Distance, FrictionTorque, Scalar, TorsionalDamping, check
 from gear.quantities.registry import part
 from gear.quantities.roles import Breakaway, SlidingFriction
@@ -44,6 +45,21 @@ class Bearing(ShaftBearing):
     load_arm: Distance = 0.0
     thickening: Thickening | None = None
     film: Palmgren | None = None
+
+    @classmethod
+    def examples(cls) -> "tuple[Bearing, ...]":
+        """Dry, and oiled under load."""
+        return (
+            cls(shaft="a", coulomb=0.1, breakaway=0.15),
+            cls(
+                shaft="a",
+                coulomb=0.1,
+                breakaway=0.15,
+                viscous=0.01,
+                load_arm=1e-4,
+                film=Palmgren(diameter=0.02, factor=2.0, lubricant=GivenViscosity(viscosity=0.1, density=900.0)),
+            ),
+        )
 
     def __post_init__(self) -> None:
         check(self)

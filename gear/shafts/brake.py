@@ -29,6 +29,11 @@ class Brake(ShaftBearing):
     shaft: str
     torque: FrictionTorque
 
+    @classmethod
+    def examples(cls) -> "tuple[Brake, ...]":
+        """Set."""
+        return (cls(shaft="a", torque=2.0),)
+
     def __post_init__(self) -> None:
         check(self)
 

@@ -36,6 +36,11 @@ class Drag(ShaftDrag):
     torques: tuple[float, ...]
     thickening: Thickening | None = None
 
+    @classmethod
+    def examples(cls) -> "tuple[Drag, ...]":
+        """Windage."""
+        return (cls(shaft="a", speeds=(0.0, 10.0, 100.0), torques=(0.0, 0.01, 0.2)),)
+
     def __post_init__(self) -> None:
         where = f"Drag on shaft {self.shaft!r}"
         if len(self.speeds) != len(self.torques) or len(self.speeds) < 2:  # noqa: PLR2004

@@ -55,6 +55,21 @@ class LuGreBearing(ShaftBearing):
 
     sticks: ClassVar[bool] = False
 
+    @classmethod
+    def examples(cls) -> "tuple[LuGreBearing, ...]":
+        """The published numbers for a unit mass."""
+        return (
+            cls(
+                shaft="a",
+                coulomb=1.0,
+                breakaway=1.5,
+                stribeck_speed=1e-3,
+                stiffness=1e5,
+                damping=1e5**0.5,
+                viscous=0.4,
+            ),
+        )
+
     def __post_init__(self) -> None:
         check(self)
         owner = f"LuGreBearing on shaft {self.shaft!r}"

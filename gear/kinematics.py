@@ -2,11 +2,13 @@
 
 from collections.abc import Mapping
 
-from gear.elimination import factorize, substitute
+import casadi as ca
+
 from gear.quantities import Matrix, Scalar
 
 PIVOT = 1e-9  # part of the largest coefficient below which a constraint says nothing new
 
+Lower = dict[tuple[int, int], ca.SX]
 Row = dict[str, Scalar]  # a linear combination of shaft motions
 
 
@@ -90,3 +92,32 @@ def _insert(row: Row, known: Mapping[str, Row]) -> Row:
         for other, turn in known[shaft].items() if shaft in known else [(shaft, 1.0)]:
             result[other] = result[other] + value * turn if other in result else value * turn
     return result
+
+
+# -- elimination on small matrices of expressions: zeros that are known stay zeros ---------------------------
+
+
+def factorize(rows: list[list[Matrix]]) -> tuple[Lower, list[list[Matrix]]]:
+    """LU factors without pivoting, for matrices whose principal minors are positive."""
+    rows, lower = [list(row) for row in rows], {}
+    for pivot in range(len(rows)):
+        for i in range(pivot + 1, len(rows)):
+            if not ca.SX(rows[i][pivot]).is_zero():
+                lower[i, pivot] = rows[i][pivot] / rows[pivot][pivot]
+                for j in range(pivot + 1, len(rows)):
+                    rows[i][j] = rows[i][j] - lower[i, pivot] * rows[pivot][j]
+    return lower, rows
+
+
+def substitute(lower: Lower, upper: list[list[Matrix]], right: list[Matrix]) -> list[Matrix]:
+    """Solution of the factorized system for one right side."""
+    solution = list(right)
+    for i in range(len(solution)):
+        for j in range(i):
+            if (i, j) in lower:
+                solution[i] = solution[i] - lower[i, j] * solution[j]
+    for i in reversed(range(len(solution))):
+        for j in range(i + 1, len(solution)):
+            solution[i] = solution[i] - upper[i][j] * solution[j]
+        solution[i] = solution[i] / upper[i][i]
+    return solution

@@ -34,7 +34,7 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from gear.elimination import factorize, substitute
+from gear.kinematics import factorize, substitute
 from gear.quantities import Matrix
 
 STUCK, FORWARD, BACKWARD, AT_LIMIT = 0, 1, -1, 2  # motion of a contact; AT_LIMIT is +2 or -2

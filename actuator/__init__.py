@@ -31,14 +31,14 @@ from actuator.linear.margins.sensitivity import sensitivity as sensitivity
 from actuator.linear.model import linearize as linearize
 from actuator.linear.modes import ModeModel as ModeModel
 from actuator.linear.modes import ModeModels as ModeModels
-from actuator.linear.modes import mode_models as mode_models
+from actuator.linear.modes import linearize_modes as linearize_modes
 from actuator.linear.operating_point import NoEquilibrium as NoEquilibrium
 from actuator.linear.operating_point import OperatingPoint as OperatingPoint
 from actuator.linear.poles import Poles as Poles
 from actuator.linear.poles import poles as poles
-from actuator.linear.reduce_order import reduced as reduced
+from actuator.linear.reduce_order import reduce_order as reduce_order
 from actuator.linear.sampled import harmonic_response as harmonic_response
-from actuator.linear.sampled import without_counts as without_counts
+from actuator.linear.sampled import without_quantization as without_quantization
 from actuator.linear.trim import trim as trim
 from actuator.orbits.find import find_orbit as find_orbit
 from actuator.orbits.flow import NoOrbit as NoOrbit
@@ -144,11 +144,14 @@ FORMER: dict[str, str] = {  # until 0.3
     "gear_stage": "stage_response",
     "locked": "block_motor",
     "unpowered": "remove_drive",
+    "mode_models": "linearize_modes",
     "predicted_cycles": "predict_cycles",
+    "reduced": "reduce_order",
     "rest": "predict_breakaway",
     "rest_set": "find_equilibrium_set",
     "OverheatFoldBack": "OverheatDerating",
     "UndervoltageFoldBack": "UndervoltageDerating",
+    "without_counts": "without_quantization",
 }
 __getattr__ = _renamed(__name__, FORMER)
 __version__ = "0.2.0"

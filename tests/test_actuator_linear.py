@@ -25,14 +25,14 @@ from actuator import (
     harmonic_response,
     lifted_margins,
     linearize,
+    linearize_modes,
     load_response,
     loop_transfer,
     margins,
-    mode_models,
     poles,
     sensitivity,
     trim,
-    without_counts,
+    without_quantization,
 )
 from actuator.parts.sensors import Sensors
 from controllers import PID, Sampling
@@ -63,7 +63,7 @@ def drive(damping=DAMPING):
 
 @cache
 def models(damping=DAMPING):
-    return mode_models(drive(damping), inputs={"torque_reference": 1.5}, partial=True)
+    return linearize_modes(drive(damping), inputs={"torque_reference": 1.5}, partial=True)
 
 
 def by_hand(s, spring, viscous):
@@ -121,7 +121,7 @@ def test_a_stuck_motor_leaves_the_load_on_its_spring():
 
 @cache
 def aileron_modes():
-    return mode_models(load_case("aileron").actuator, inputs={"reference": 0.1})
+    return linearize_modes(load_case("aileron").actuator, inputs={"reference": 0.1})
 
 
 @pytest.mark.parametrize("mode", ["stuck", "forward"])
@@ -135,7 +135,24 @@ def test_what_is_locked_can_be_left_out_without_another_response(mode):
 
 def test_a_stuck_model_without_what_is_locked_has_no_pole_at_zero_but_the_integrator():
     stuck = poles(aileron_modes()["stuck"].point)
-    assert [pole.part for pole in stuck if pole.frequency == 0] == ["controller.speed"]
+    (integrator,) = (pole for pole in stuck if pole.frequency == 0)
+    assert integrator.part == "controller"
+    assert integrator.participation["controller.speed.integral"] == pytest.approx(1.0)
+
+
+def test_a_pole_of_the_winding_is_told_from_one_of_the_motor_shaft():
+    found = list(poles(aileron_modes()["forward"].point))
+    electrical = max(found, key=lambda pole: pole.participation["motor.current_q"])
+    assert (electrical.part, electrical.value.imag) == ("motor winding", 0)
+    assert abs(electrical.value + 3843) < 1
+    assert "shaft motor" in {pole.part for pole in found}
+    assert {pole.part for pole in found} <= {
+        "motor winding",
+        "shaft motor",
+        "shaft idler",
+        "shaft surface",
+        "controller",
+    }
 
 
 def test_each_mesh_with_a_gap_has_its_flight():
@@ -178,7 +195,7 @@ def test_an_unreachable_mode_is_named_with_the_reachable_ones():
 def test_where_no_mode_is_reachable_the_reason_is_given():
     inputs = {"reference": 0.1, "load_torque": -300.0}
     with pytest.raises(NoEquilibrium, match="aileron: "):
-        mode_models(load_case("aileron").actuator, inputs=inputs, parameters={"load.stiffness": 0.0})
+        linearize_modes(load_case("aileron").actuator, inputs=inputs, parameters={"load.stiffness": 0.0})
 
 
 # -- sampled control ----------------------------------------------------------------------------------------
@@ -349,13 +366,13 @@ def test_a_voltage_that_turns_with_the_rotor_cannot_be_opened():
         loop_transfer(sampled_aileron(), "voltage")
 
 
-def test_sensors_that_count_are_refused_and_can_be_taken_without_counts():
+def test_sensors_that_count_are_refused_and_can_be_taken_without_quantization():
     counting = servo(sensor=AngleSensor(resolution=1e-4))
-    with pytest.raises(ValueError, match=r"sensors.load.resolution makes steps.*without_counts"):
+    with pytest.raises(ValueError, match=r"sensors.load.resolution makes steps.*without_quantization"):
         loop_transfer(trim(counting, "forward"), "position")
-    smooth = loop_transfer(trim(without_counts(counting), "forward"), "torque_reference")
+    smooth = loop_transfer(trim(without_quantization(counting), "forward"), "torque_reference")
     np.testing.assert_allclose(smooth(Z), loop_by_hand(Z, 0), rtol=1e-9)
-    assert mode_models(counting)["forward"].loop("position").dt == PERIOD
+    assert linearize_modes(counting)["forward"].loop("position").dt == PERIOD
 
 
 def test_a_sensor_that_is_late_delays_the_position_by_its_ticks():
@@ -458,7 +475,7 @@ def test_poles_of_a_mass_on_a_spring_are_shared_by_its_angle_and_its_speed():
     assert pole.frequency == pytest.approx(5.0, rel=1e-12)
     assert pole.damping == pytest.approx(4 / (2 * math.sqrt(50 * 2)), rel=1e-12)
     assert pole.participation == pytest.approx({"mass.angle": 0.5, "mass.speed": 0.5}, rel=1e-9)
-    assert pole.part == "mass"
+    assert pole.part == "shaft mass"
 
 
 @pytest.mark.parametrize("integral", [0.0, INTEGRAL])
@@ -478,7 +495,7 @@ def test_a_stuck_shaft_under_pid_has_the_pole_of_its_integral_alone(integral):
 def test_poles_of_two_masses_far_apart_belong_to_their_masses():
     found = models()["forward, stuck bearings.load"].point
     (pole,) = poles(found)
-    assert pole.parts["motor"] == pytest.approx(1.0)
+    assert pole.parts["shaft motor"] == pytest.approx(1.0)
     assert pole.frequency == pytest.approx(math.sqrt(SPRING / MOTOR), rel=1e-9)
 
 

@@ -24,7 +24,7 @@ from actuator import (
     loop_transfer,
     margins,
     poles,
-    reduced,
+    reduce_order,
     trim,
 )
 from controllers import Sampling
@@ -180,7 +180,7 @@ KINDS = pytest.mark.parametrize("kind", ["continuous", "sampled"])
 
 
 def short(kind):
-    return reduced(loops()[kind], FAST if kind == "continuous" else None)
+    return reduce_order(loops()[kind], FAST if kind == "continuous" else None)
 
 
 @KINDS
@@ -244,14 +244,14 @@ def test_the_charts_of_python_control_take_a_reduced_loop(draw_it):
 def test_a_reduced_current_loop_is_an_integrator():
     # the zero of the PI cancels R/L, all else is locked: L = bandwidth/s
     stuck = trim(load_case("aileron").actuator, "stuck", inputs={"reference": 0.1})
-    loop = reduced(loop_transfer(stuck, "voltage", minimal=True))
+    loop = reduce_order(loop_transfer(stuck, "voltage", minimal=True))
     assert loop.nstates == 1
     np.testing.assert_allclose(loop(1j * np.array([1.0, 100.0])), 4000 / (1j * np.array([1.0, 100.0])), rtol=1e-9)
 
 
 def test_nothing_is_left_of_a_loop_through_a_stuck_gear():
     stuck = trim(load_case("aileron").actuator, "stuck", inputs={"reference": 0.1})
-    loop = reduced(loop_transfer(stuck, "position", minimal=True))
+    loop = reduce_order(loop_transfer(stuck, "position", minimal=True))
     assert (loop.nstates, loop.D.item()) == (0, 0)
 
 
@@ -260,7 +260,7 @@ def test_nothing_is_left_of_a_loop_through_a_stuck_gear():
     [(60.0, 0.1, (1e4, 1e6)), (60.0, 0.01, (1e6,)), (100.0, 0.01, (2e5,)), (60.0, 0.1, (1e4,))],
 )
 def test_an_integrator_beside_a_lag_at_a_million_is_kept(gain, corner, lags):
-    loop = reduced(in_other_units(speed_loop(gain, corner, *lags)))
+    loop = reduce_order(in_other_units(speed_loop(gain, corner, *lags)))
     assert loop.nstates == 2 + len(lags)
     s = 1j * np.logspace(-2, 4, 13)
     expected = gain * (s + corner) / s**2 / np.prod([s / lag + 1 for lag in lags], axis=0)
@@ -270,7 +270,7 @@ def test_an_integrator_beside_a_lag_at_a_million_is_kept(gain, corner, lags):
 
 def test_fast_poles_become_a_lag():
     slow, fast = control.ss(-1.0, 3.0, 1.0, 0), control.ss(-1e5, 1e5, 0.01, 0)
-    loop = reduced(turned(control.parallel(slow, fast)), 1e3)
+    loop = reduce_order(turned(control.parallel(slow, fast)), 1e3)
     np.testing.assert_allclose(np.sort(loop.poles().real), [-1e3, -1.0], rtol=1e-9)
     s = 1j * np.logspace(-2, 2, 9)
     np.testing.assert_allclose(loop(s), 3 / (s + 1) + 0.01 / (s / 1e3 + 1), rtol=1e-9)
@@ -287,7 +287,7 @@ def test_fast_poles_become_a_lag():
 )
 def test_a_reduction_that_would_hide_something_is_refused(loop, fastest, message):
     with pytest.raises(ValueError, match=message):
-        reduced(loop, fastest)
+        reduce_order(loop, fastest)
 
 
 # -- operating points ---------------------------------------------------------------------------------------

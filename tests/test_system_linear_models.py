@@ -22,9 +22,9 @@ from actuator import (
     TorqueSource,
     frequency_response,
     linearize,
+    linearize_modes,
     loop_transfer,
     margins,
-    mode_models,
     simulate,
     trim,
 )
@@ -280,7 +280,7 @@ def test_without_stiction_a_sine_stream_through_the_aileron_is_its_linear_respon
         sets={"frictionless": frictionless},
         workers=1,
     )
-    model = mode_models(aileron(), parameters=frictionless)["forward"]
+    model = linearize_modes(aileron(), parameters=frictionless)["forward"]
     expected = model.linear(["reference"], ["load_angle", "motor_torque"])(2j * np.pi * np.array(frequencies))[:, 0]
     for amplitude in measured.data.amplitude:
         response = measured.data.response.sel(amplitude=amplitude).values[0, 0].T

@@ -19,7 +19,7 @@ from actuator import (
     find_orbit,
     hunting_margin,
     linearize,
-    mode_models,
+    linearize_modes,
     predict_breakaway,
     simulate,
     trim,
@@ -254,7 +254,7 @@ def held():
     [
         ("find_equilibrium_set", lambda: find_equilibrium_set(mass(), {})),
         ("predict_breakaway", lambda: predict_breakaway(mass(), {})),
-        ("mode_models", lambda: mode_models(mass())),
+        ("linearize_modes", lambda: linearize_modes(mass())),
         ("the stiction margin", lambda: hunting_margin(held(), "stiction")),
     ],
 )

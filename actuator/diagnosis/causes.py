@@ -183,7 +183,7 @@ def removals(plant: Actuator, parameters: Mapping[str, float] | None = None) -> 
         ideal = replace(plant, sampling=None, sensors=Sensors(), controller=plant.controller.in_continuous_time())
         found[SAMPLING] = Removal(ideal, _kept(given, ideal), "controller in continuous time, sensors ideal")
     if system.parameters_having(Resolution):
-        smooth = replace(plant, sensors=_without_counts(plant.sensors))
+        smooth = replace(plant, sensors=_without_quantization(plant.sensors))
         found[COUNTS] = Removal(smooth, _kept(given, smooth), "sensors without resolution")
     return found
 
@@ -197,7 +197,7 @@ def _none_of(system: HybridSystem, gain: Parameter) -> float:
     return 0.0
 
 
-def _without_counts(sensors: Sensors) -> Sensors:
+def _without_quantization(sensors: Sensors) -> Sensors:
     """The same sensors without resolution."""
     given = {field.name: getattr(sensors, field.name) for field in fields(sensors)}
     smooth = {name: replace(sensor, resolution=None) for name, sensor in given.items() if sensor is not None}

@@ -7,8 +7,8 @@ import numpy as np
 
 from actuator.linear.operating_point import OperatingPoint
 from actuator.system.hybrid import HybridSystem
+from gear.quantities.roles import NoiseLevel, Resolution, ShaftAngle, ShaftSpeed
 
-STEPPED = ("resolution", "noise")  # fields of a sensor that make steps of its readings
 STILL = 1e-9  # rate of a state over its nominal size [1/s] that counts as zero
 ROUNDING, MOST_ROUNDING = 100 * np.finfo(float).eps, 1e-2
 DEPENDENT = 1e-9  # part of a row that is left of it when it follows from others
@@ -17,15 +17,11 @@ HELD = 1e-10  # part of the fastest rate of the model by which something locked 
 
 def require_smooth(system: HybridSystem) -> None:
     """Raise ValueError where sensors count or are noisy."""
-    steps = [
-        parameter.name
-        for parameter in system.parameters
-        if parameter.name.startswith("sensors.") and parameter.name.endswith(STEPPED)
-    ]
+    steps = [each.name for each in system.parameters if each.role(Resolution) or each.role(NoiseLevel)]
     if steps:
         raise ValueError(
             f"{system.name}: {', '.join(steps)} makes steps, which have no derivative: linearize the actuator with "
-            "`without_counts(actuator)`, whose sensors read between their counts"
+            "`without_quantization(actuator)`, whose sensors read between their counts"
         )
 
 
@@ -85,7 +81,7 @@ def rates_function(system: HybridSystem) -> ca.Function:
     return ca.Function("rates", [x, m, u, p], [system.flow(x, m, u, p) + changes])
 
 
-def unlocked(point: OperatingPoint, matrices: tuple[np.ndarray, ...]) -> tuple[tuple[np.ndarray, ...], list[int]]:
+def remove_stuck(point: OperatingPoint, matrices: tuple[np.ndarray, ...]) -> tuple[tuple[np.ndarray, ...], list[int]]:
     """A, B, C, D without the states that follow from the others where contacts are stuck, and which states are left.
 
     A stuck contact has no slip, c . speeds = 0, and does not travel, c . angles = 0 in deviations from the point. Each
@@ -97,8 +93,8 @@ def unlocked(point: OperatingPoint, matrices: tuple[np.ndarray, ...]) -> tuple[t
         Where the model moves what is locked.
     """
     a, b, c, d = matrices
-    rows = [row for slip in slips(point) for row in (slip, _travel(point, slip))]
-    expressed, kept = eliminated(rows, len(a))
+    rows = [row for slip in slip_rows(point) for row in (slip, _travel(point, slip))]
+    expressed, kept = eliminate(rows, len(a))
     scale = np.array([quantity.nominal for quantity in point.system.states])
     fastest = abs(a * scale / scale[:, None]).max(initial=0.0)
     for row in rows:
@@ -111,30 +107,37 @@ def unlocked(point: OperatingPoint, matrices: tuple[np.ndarray, ...]) -> tuple[t
     return (a[kept] @ expressed, b[kept], c @ expressed, d), kept
 
 
-def slips(point: OperatingPoint) -> list[np.ndarray]:
+def slip_rows(point: OperatingPoint) -> list[np.ndarray]:
     """A row over the states for the slip of each stuck contact."""
     system = point.system
-    outputs = [quantity.name for quantity in system.outputs]
     modes = dict(zip(system.modes, np.round(point.m), strict=True))
-    rows = []
-    for name, mode in modes.items():
-        contact = name.removesuffix(".motion")
-        if contact == name or abs(mode) == 1 or modes.get(f"{contact}.flank", 1) == 0:
-            continue
-        rows.append(outputs.index(f"{contact}.slip_speed"))
-    return list(jacobians(point)[2][rows])
+    stuck = [
+        k
+        for k, contact in enumerate(system.contacts)
+        if abs(modes[contact.motion]) != 1 and not (contact.flank and modes[contact.flank] == 0)
+    ]
+    return list(_of_slips(system)(point.x, point.m, point.u, point.p).full()[stuck])
+
+
+@lru_cache(maxsize=32)
+def _of_slips(system: HybridSystem) -> ca.Function:
+    x, m, u, p = _symbols(system)
+    slip = ca.SX(0, 1) if system.contact_state is None else system.contact_state(x, m, u, p)[0]
+    return ca.Function("slips", [x, m, u, p], [ca.jacobian(slip, x)])
 
 
 def _travel(point: OperatingPoint, slip: np.ndarray) -> np.ndarray:
     """The same row over the angles instead of the speeds."""
-    names = [quantity.name for quantity in point.system.states]
+    states = point.system.states
+    angles = {role.shaft: k for k, state in enumerate(states) if (role := state.role(ShaftAngle))}
     travel = np.zeros_like(slip)
-    for k in np.flatnonzero(slip):
-        travel[names.index(names[k].removesuffix("speed") + "angle")] = slip[k]
+    for k, state in enumerate(states):
+        if slip[k] and (role := state.role(ShaftSpeed)):
+            travel[angles[role.shaft]] = slip[k]
     return travel
 
 
-def eliminated(rows: list[np.ndarray], states: int) -> tuple[np.ndarray, list[int]]:
+def eliminate(rows: list[np.ndarray], states: int) -> tuple[np.ndarray, list[int]]:
     """All states by those that are left where each row over them is zero, and which are left.
 
     Each row takes out one state, the one with the largest part in it.

@@ -8,10 +8,11 @@ import numpy as np
 
 from actuator.linear.model import build_model, linearize, require_still, select
 from actuator.linear.operating_point import OperatingPoint
-from actuator.linear.sampled import lifted
+from actuator.linear.sampled import lift
 from actuator.system.builder import PREFIX
 from actuator.system.hybrid import HybridSystem
 from gear.quantities import require_known
+from gear.quantities.roles import LoopSignal
 
 CANCELED = 8 * np.finfo(float).eps  # part that is left by rounding of what the opened loop had fed back
 
@@ -30,7 +31,8 @@ def loop_transfer(
     In sampled control the signals are held, and L is exact in discrete time with the period of the slowest clock. A
     signal that is renewed N times in that period is cut N times in it: L has N inputs and outputs.
 
-    It is a model that python-control's tools take. Those that make polynomials of it, for root loci, need `reduced`.
+    It is a model that python-control's tools take; those that make polynomials of it, for root loci, need that of
+    `reduce_order`.
 
     Parameters
     ----------
@@ -55,7 +57,7 @@ def loop_transfer(
     require_still(point, drifting)
     every = ticks_between(system, at)
     selected = select(system, [PREFIX + at], [at])
-    matrices = lifted(point, selected.columns, selected.rows, every)
+    matrices = lift(point, selected.columns, selected.rows, every)
     parts = system.hyperperiod // every
     channels = [at] if parts == 1 else [f"{at}_{k}" for k in range(parts)]
     step = system.hyperperiod * system.tick_period(point.p)
@@ -65,8 +67,7 @@ def loop_transfer(
 
 def require_loop(system: HybridSystem, at: str) -> None:
     """Raise KeyError where a system has no loop signal of that name."""
-    points = [q.name.removeprefix(PREFIX) for q in system.inputs if q.name.startswith(PREFIX)]
-    require_known([at], points, "loop signal")
+    require_known([at], [role.signal for q in system.inputs if (role := q.role(LoopSignal))], "loop signal")
 
 
 def _cut(closed: tuple[Any, ...], states: Sequence[str], channels: Sequence[str], step: float) -> control.StateSpace:
@@ -92,11 +93,10 @@ def _cut(closed: tuple[Any, ...], states: Sequence[str], channels: Sequence[str]
 def ticks_between(system: HybridSystem, at: str) -> int:
     """Ticks between two values of a held signal."""
     assert system.tick is not None
-    names = [quantity.name for quantity in system.states]
-    if f"controller.{at}" not in names:
+    held = [k for k, state in enumerate(system.states) if (role := state.role(LoopSignal)) and role.signal == at]
+    if not held:
         raise ValueError(
             f"{system.name}: {at} is not held between ticks, it turns with the rotor; open the loop at another signal"
         )
     by_due = system.tick.jac_sparsity(0, 0)
-    row = names.index(f"controller.{at}")
-    return min(system.clocks[k].every for i, k in zip(by_due.row(), by_due.get_col(), strict=True) if i == row)
+    return min(system.clocks[k].every for i, k in zip(by_due.row(), by_due.get_col(), strict=True) if i == held[0])

@@ -6,9 +6,9 @@ from typing import NamedTuple
 import control
 import numpy as np
 
-from actuator.linear.jacobians import jacobians, require_smooth, rounding, unlocked
+from actuator.linear.jacobians import jacobians, remove_stuck, require_smooth, rounding
 from actuator.linear.operating_point import NoEquilibrium, OperatingPoint
-from actuator.linear.sampled import lifted
+from actuator.linear.sampled import lift
 from actuator.system.hybrid import HybridSystem
 from gear.quantities import require_known
 
@@ -76,7 +76,7 @@ def least_dynamics(point: OperatingPoint, *, drifting: Sequence[str] = ()) -> tu
     """
     require_still(point, drifting)
     matrices, step = _matrices(point, select(point.system, [], []))
-    (a, *_), kept = unlocked(point, matrices)
+    (a, *_), kept = remove_stuck(point, matrices)
     return a, [point.system.states[k].name for k in kept], step
 
 
@@ -85,7 +85,7 @@ def _matrices(point: OperatingPoint, selected: _Selected) -> tuple[tuple[np.ndar
     system = point.system
     if system.clocks:
         every = system.hyperperiod
-        return lifted(point, selected.columns, selected.rows, every), every * system.tick_period(point.p)
+        return lift(point, selected.columns, selected.rows, every), every * system.tick_period(point.p)
     a, b, c, d = jacobians(point)
     return (a, b[:, selected.columns], c[selected.rows], d[np.ix_(selected.rows, selected.columns)]), 0.0
 
@@ -136,7 +136,7 @@ def build_model(  # noqa: PLR0913 - a model and all its names
     """A named model from its matrices, with or without what is locked."""
     names = [_signal(quantity.name) for quantity in point.system.states]
     if minimal:
-        matrices, kept = unlocked(point, matrices)
+        matrices, kept = remove_stuck(point, matrices)
         names = [names[k] for k in kept]
     return control.StateSpace(
         *matrices, step, states=names, inputs=inputs, outputs=outputs, remove_useless_states=False

@@ -12,11 +12,11 @@ from actuator.actuator import Actuator
 from actuator.linear.loop import loop_transfer
 from actuator.linear.margins.crossings import Margins, margins
 from actuator.linear.model import linearize
-from actuator.linear.operating_point import MOTIONS, NoEquilibrium, OperatingPoint
-from actuator.linear.sampled import without_counts
+from actuator.linear.operating_point import NoEquilibrium, OperatingPoint, gaps
+from actuator.linear.sampled import without_quantization
 from actuator.linear.trim import trim
-from actuator.system.contact_modes import FREE, STUCK, contact_labels
-from actuator.system.hybrid import HybridSystem, require_sticking
+from actuator.system.contact_modes import FORWARD, FREE, MOTIONS, STUCK, contact_labels
+from actuator.system.hybrid import HybridSystem, Place, require_sticking
 from gear.quantities import require_known
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ class ModeModels:
         return plot_modes(self.loops(at), f"loop opened at {at.replace('_', ' ')}")
 
 
-def mode_models(
+def linearize_modes(
     plant: Actuator | HybridSystem,
     *,
     inputs: Mapping[str, float] | None = None,
@@ -137,8 +137,8 @@ def mode_models(
     NoEquilibrium
         Where no mode can be reached at all, with the reason of the first.
     """
-    system = without_counts(plant).system() if isinstance(plant, Actuator) else plant
-    require_sticking(system, "mode_models")
+    system = without_quantization(plant).system() if isinstance(plant, Actuator) else plant
+    require_sticking(system, "linearize_modes")
     found: list[ModeModel] = []
     reasons: dict[str, NoEquilibrium] = {}
 
@@ -151,7 +151,7 @@ def mode_models(
             found.append(ModeModel(name=name, point=point, equilibrium=True))
 
     contacts = [contact.name for contact in system.contacts]
-    for word in MOTIONS if contacts else ["forward"]:
+    for word in MOTIONS if contacts else [FORWARD]:
         attempt(word, word, guess)
     if not found:
         raise next(iter(reasons.values()))
@@ -176,14 +176,13 @@ def _short(contacts: Sequence[str]) -> str:
 
 def _gapped(system: HybridSystem) -> list[str]:
     """Meshes and couplings with a gap, by path; not the end stops, which are mostly not touched."""
-    ends = [name.removesuffix(" flank +") for name in system.margin_names if name.endswith(" flank +")]
-    return [name for name in ends if not name.startswith("gear.stops.")]
+    return [name for name, place in gaps(system).items() if place is not Place.STOP]
 
 
 def _in_gap(model: ModeModel, name: str) -> ModeModel:
     """The same with one mesh or coupling in its gap."""
-    point = model.point
-    changed = {f"{name}.flank": 0.0, f"{name}.motion": 0.0}
-    m = np.array([changed.get(mode, value) for mode, value in zip(point.system.modes, point.m, strict=True)])
-    flight = OperatingPoint(system=point.system, x=point.x, m=m, u=point.u, p=point.p, rates=point.rates)
+    point, system = model.point, model.point.system
+    inside = np.array([mode.at == name for mode in system.mode_variables])
+    m = np.where(inside, 0.0, point.m)
+    flight = OperatingPoint(system=system, x=point.x, m=m, u=point.u, p=point.p, rates=point.rates)
     return ModeModel(name=f"{model.name}, {FREE} {_short([name])}", point=flight, equilibrium=False)

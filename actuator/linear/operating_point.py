@@ -5,11 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuator.system.hybrid import HybridSystem
+from actuator.system.contact_modes import MOTIONS
+from actuator.system.hybrid import EventKind, HybridSystem, Mode, ModeKind, Place
 from gear.quantities import require_known
-
-MOTIONS = {"stuck": 0, "forward": 1, "backward": -1}
-STOPS = "gear.stops."  # what the flanks of end stops are called
 
 
 class NoEquilibrium(ValueError):
@@ -50,8 +48,8 @@ class OperatingPoint:
     @property
     def flanks(self) -> dict[str, int]:
         """Flank of each mesh, coupling and end stop that has one, by name."""
-        named = zip(self.system.modes, self.m, strict=True)
-        return {name.removesuffix(".flank"): int(mode) for name, mode in named if name.endswith(".flank")}
+        values = dict(zip(self.system.modes, self.m, strict=True))
+        return {mode.at: int(values[mode.name]) for mode in flank_modes(self.system)}
 
     @property
     def outputs(self) -> dict[str, float]:
@@ -72,26 +70,32 @@ def modes_of(
     names = [contact.name for contact in system.contacts]
     if isinstance(contacts, str):
         require_known([contacts], MOTIONS, "contact mode")
-        values = {f"{name}.motion": MOTIONS[contacts] * system.travel[name] for name in names}
+        values = {contact.motion: MOTIONS[contacts] * contact.direction for contact in system.contacts}
     else:
         require_known(contacts, names, "contact")
         require_known(contacts.values(), MOTIONS, "contact mode")
         missing = [name for name in names if name not in contacts]
         if missing:
             raise KeyError(f"no mode given for contact {', '.join(missing)}; each needs stuck, forward or backward")
-        values = {f"{name}.motion": MOTIONS[word] for name, word in contacts.items()}
-    flank_names = [name for name in system.modes if name.endswith(".flank")]
-    given = {f"{name}.flank": value for name, value in (flanks or {}).items()}
-    require_known(given, flank_names, "flank")
-    values |= {name: given.get(name, usual_flank(name)) for name in flank_names}
-    free = {name: 0 for name in values if name.endswith(".motion") and values.get(_flank_of(name)) == 0}
-    return system.mode_vector(values | free)
+        values = {contact.motion: MOTIONS[contacts[contact.name]] for contact in system.contacts}
+    sides = usual_flanks(system)
+    require_known(flanks or {}, sides, "flank")
+    sides |= flanks or {}
+    values |= {mode.name: sides[mode.at] for mode in flank_modes(system)}
+    values |= {contact.motion: 0 for contact in system.contacts if contact.flank and values[contact.flank] == 0}
+    return system.mode_vector(values)
 
 
-def _flank_of(motion: str) -> str:
-    return motion.removesuffix(".motion") + ".flank"
+def flank_modes(system: HybridSystem) -> list[Mode]:
+    """Mode variables of the flanks of meshes, couplings and end stops."""
+    return [mode for mode in system.mode_variables if mode.kind is ModeKind.FLANK]
 
 
-def usual_flank(name: str) -> int:
+def usual_flanks(system: HybridSystem) -> dict[str, int]:
     """Teeth and couplings transmit; an end stop is not touched."""
-    return 0 if name.startswith(STOPS) else 1
+    return {mode.at: 0 if mode.place is Place.STOP else 1 for mode in flank_modes(system)}
+
+
+def gaps(system: HybridSystem) -> dict[str, Place]:
+    """What can be in a gap, between two flanks, by path."""
+    return {event.at: event.place for event in system.events if event.kind is EventKind.GAP}

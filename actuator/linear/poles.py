@@ -13,12 +13,13 @@ from actuator.linear.operating_point import OperatingPoint
 
 if TYPE_CHECKING:
     import xarray
+
 LEAST = 0.02  # share of a state that is worth a word
 AT_ONCE = 1e-12  # a pole z of which nothing is left after one period
 RIGID = 1e-7  # part of the fastest pole below which a pole is at zero
 
 
-def room(a: np.ndarray, *, discrete: bool) -> float:
+def rounding_bound(a: np.ndarray, *, discrete: bool) -> float:
     """How far within the boundary of stability the poles are, each moved there by what may be its rounding.
 
         n eps |A| / |y x|,    at most sqrt(n eps) |A|
@@ -50,12 +51,14 @@ class Pole:
     value : complex
         [1/s], of a pair the one above the real axis; in discrete time ln(z)/period, minus infinity for a delay.
     participation : mapping of str to float
-        Share of each state, its left times its right eigenvector: what the state has to do with the pole,
-        whatever its unit. They add to one.
+        Participation factor of each state, its left times its right eigenvector; independent of units, they sum to 1.
+    owners : mapping of str to str
+        What each state belongs to, as its system says it: "motor winding", "shaft motor", "controller".
     """
 
     value: complex
     participation: Mapping[str, float]
+    owners: Mapping[str, str]
 
     @property
     def frequency(self) -> float:
@@ -71,10 +74,10 @@ class Pole:
 
     @property
     def parts(self) -> dict[str, float]:
-        """Share of each part, the largest first; a part is the name of a state without its last word."""
+        """Share of each part, the largest first: what states belong to; one without an owner is its own."""
         shares: dict[str, float] = {}
         for name, share in self.participation.items():
-            part = name.rpartition(".")[0] or name
+            part = self.owners[name] or name
             shares[part] = shares.get(part, 0.0) + share
         return dict(sorted(shares.items(), key=lambda pair: -pair[1]))
 
@@ -140,8 +143,9 @@ def poles(point: OperatingPoint, *, drifting: Sequence[str] = ()) -> Poles:
     Poles
     """
     a, states, step = least_dynamics(point, drifting=drifting)
-    nominal = {quantity.name: quantity.nominal for quantity in point.system.states}
-    scale = np.array([nominal[name] for name in states])
+    known = {quantity.name: quantity for quantity in point.system.states}
+    scale = np.array([known[name].nominal for name in states])
+    owners = {name: known[name].owner for name in states}
     values, left, right = eig(a / scale[:, None] * scale, left=True, right=True)  # pyright: ignore[reportAssignmentType] - stubs of three answers
     shares = abs(left.conj() * right)
     shares = shares / shares.sum(axis=0)
@@ -150,7 +154,7 @@ def poles(point: OperatingPoint, *, drifting: Sequence[str] = ()) -> Poles:
         values = np.array([np.log(complex(z)) / step if abs(z) > AT_ONCE else -np.inf for z in values])
     values = np.where(abs(values) > RIGID * abs(values[np.isfinite(values)]).max(initial=0.0), values, 0)
     found = [
-        Pole(value=complex(value), participation=dict(zip(states, share.tolist(), strict=True)))
+        Pole(value=complex(value), participation=dict(zip(states, share.tolist(), strict=True)), owners=owners)
         for value, share in zip(values, shares.T, strict=True)
         if value.imag >= 0 or step and value.imag <= -math.pi / step * (1 - RIGID)
     ]

@@ -15,7 +15,7 @@ COARSE = 20  # of the points of the grid, every so many are compared
 FAINT = 1e-3  # part of the loop at `fastest` of which the fast poles are left out
 
 
-def reduced(loop: control.StateSpace, fastest: float | None = None) -> control.StateSpace:
+def reduce_order(loop: control.StateSpace, fastest: float | None = None) -> control.StateSpace:
     """A loop with the same response up to a frequency and fewer states, for root loci.
 
     States that the input does not move or the output does not see, but for rounding, are left out as long as the
@@ -50,24 +50,26 @@ def reduced(loop: control.StateSpace, fastest: float | None = None) -> control.S
     a, b, c = np.asarray(balanced), np.linalg.solve(transform, response.b), response.c @ transform
     if fastest is not None:
         _require_slow_crossover(response, fastest)
-        a, b, c = _slow(a, b, c, fastest, FAINT * abs(response(fastest)))
+        a, b, c = _slow_part(a, b, c, fastest, FAINT * abs(response(fastest)))
     whole = control.StateSpace(
         a, b, c, response.d, loop.dt, inputs=loop.input_labels, outputs=loop.output_labels, remove_useless_states=False
     )
-    return next((shown for shown in (_shown(whole, hidden) for hidden in HIDDEN) if _same(shown, whole)), whole)
+    return next(
+        (shown for shown in (_minimal(whole, hidden) for hidden in HIDDEN) if _same_response(shown, whole)), whole
+    )
 
 
-def _shown(loop: control.StateSpace, hidden: float) -> control.StateSpace:
+def _minimal(loop: control.StateSpace, hidden: float) -> control.StateSpace:
     """The part of a loop that the input moves and the output sees."""
     a, b, c = (np.asarray(part) for part in (loop.A, loop.B, loop.C))
-    a, c, b = (part.T for part in _moved(a.T, c.T, b.T, hidden))
-    a, b, c = _moved(a, b, c, hidden)
+    a, c, b = (part.T for part in _reachable(a.T, c.T, b.T, hidden))
+    a, b, c = _reachable(a, b, c, hidden)
     return control.StateSpace(
         a, b, c, loop.D, loop.dt, inputs=loop.input_labels, outputs=loop.output_labels, remove_useless_states=False
     )
 
 
-def _same(shown: control.StateSpace, whole: control.StateSpace) -> bool:
+def _same_response(shown: control.StateSpace, whole: control.StateSpace) -> bool:
     """Whether two loops have the same response, where there is one beyond doubt."""
     response = LoopResponse(whole)
     frequencies = GRID[::COARSE][GRID[::COARSE] > SLOW]
@@ -81,17 +83,17 @@ def _same(shown: control.StateSpace, whole: control.StateSpace) -> bool:
 def _require_slow_crossover(response: LoopResponse, fastest: float) -> None:
     """Raise ValueError where poles faster than this decide about stability too."""
     if response.step:
-        raise ValueError(f"reduced: fastest={fastest:.6g} rad/s is for loops in continuous time; leave it out")
+        raise ValueError(f"reduce_order: fastest={fastest:.6g} rad/s is for loops in continuous time; leave it out")
     beyond = np.append(fastest, GRID[fastest < GRID])
     sizes = abs(response.values(beyond)[0])
     if sizes.max() > PASSED:
         raise ValueError(
-            f"reduced: the loop gain is {sizes.max():.3g} beyond fastest={fastest:.6g} rad/s, where it must be at most "
-            f"{PASSED} for slower poles to decide alone; choose it above {beyond[sizes > PASSED][-1]:.6g} rad/s"
+            f"reduce_order: the loop gain is {sizes.max():.3g} beyond fastest={fastest:.6g} rad/s, where it must be "
+            f"at most {PASSED} for slower poles to decide alone; choose it above {beyond[sizes > PASSED][-1]:.6g} rad/s"
         )
 
 
-def _slow(a: np.ndarray, b: np.ndarray, c: np.ndarray, fastest: float, faint: float) -> tuple[np.ndarray, ...]:
+def _slow_part(a: np.ndarray, b: np.ndarray, c: np.ndarray, fastest: float, faint: float) -> tuple[np.ndarray, ...]:
     """The part with the slow poles, and a lag with the gain of the others at standstill."""
 
     def is_slow(real: float, imaginary: float) -> bool:
@@ -100,7 +102,9 @@ def _slow(a: np.ndarray, b: np.ndarray, c: np.ndarray, fastest: float, faint: fl
     triangle, base, count = schur(a, output="real", sort=is_slow)  # pyright: ignore[reportAssignmentType] - stubs of two answers
     slow, fast, corner = triangle[:count, :count], triangle[count:, count:], triangle[:count, count:]
     if len(fast) and np.linalg.eigvals(fast).real.max() >= 0:
-        raise ValueError(f"reduced: a pole faster than fastest={fastest:.6g} rad/s is unstable; choose it beyond that")
+        raise ValueError(
+            f"reduce_order: a pole faster than fastest={fastest:.6g} rad/s is unstable; choose it beyond that"
+        )
     b, c = base.T @ b, c @ base
     coupling = np.asarray(solve_sylvester(slow, -fast, -corner))
     b_slow, c_slow, c_fast = b[:count] - coupling @ b[count:], c[:, :count], c[:, count:] + c[:, :count] @ coupling
@@ -112,7 +116,7 @@ def _slow(a: np.ndarray, b: np.ndarray, c: np.ndarray, fastest: float, faint: fl
     return lagged, np.vstack([b_slow, [[fastest]]]), np.hstack([c_slow, gain])
 
 
-def _moved(a: np.ndarray, b: np.ndarray, c: np.ndarray, hidden: float) -> tuple[np.ndarray, ...]:
+def _reachable(a: np.ndarray, b: np.ndarray, c: np.ndarray, hidden: float) -> tuple[np.ndarray, ...]:
     """The part that the input moves: a staircase from the input on, up to the first step that is rounding."""
     n = len(a)
     if not b.any() or not c.any():

@@ -17,12 +17,12 @@ from actuator.linear.operating_point import OperatingPoint
 from gear.quantities import require_known
 
 
-def without_counts(actuator: Actuator) -> Actuator:
+def without_quantization(actuator: Actuator) -> Actuator:
     """The same actuator with sensors that read between their counts, and without noise; delays and errors stay."""
     return replace(actuator, sensors=actuator.sensors.with_each(resolution=None, noise=None))
 
 
-def lifted(point: OperatingPoint, columns: Sequence[int], rows: Sequence[int], every: int) -> tuple[np.ndarray, ...]:
+def lift(point: OperatingPoint, columns: Sequence[int], rows: Sequence[int], every: int) -> tuple[np.ndarray, ...]:
     """A, B, C, D over the ticks after which all clocks are due again.
 
     Inputs are constant over `every` ticks, outputs are those just after the first of them; where that is not the whole

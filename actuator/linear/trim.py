@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from actuator.actuator import Actuator
-from actuator.linear.jacobians import eliminated, rates_function, rates_jacobian, rounding, slips
-from actuator.linear.operating_point import STOPS, NoEquilibrium, OperatingPoint, modes_of, usual_flank
-from actuator.system.contact_modes import contact_labels
-from actuator.system.hybrid import HybridSystem
+from actuator.linear.jacobians import eliminate, rates_function, rates_jacobian, rounding, slip_rows
+from actuator.linear.operating_point import NoEquilibrium, OperatingPoint, gaps, modes_of, usual_flanks
+from actuator.system.contact_modes import STUCK, contact_labels
+from actuator.system.hybrid import EventKind, HybridSystem, ModeKind
 from gear.quantities import require_known
 
 STEPS = 60  # Newton steps; the equations of a mode are nearly linear
@@ -29,11 +29,11 @@ class Balance:
         self.scale = np.array([quantity.nominal for quantity in system.states])
         # what stuck contacts lock is no unknown: the balance of its torques holds whatever they are, but for rounding
         start = OperatingPoint(system=system, x=x, m=m, u=u, p=p, rates=np.zeros_like(x))
-        self.expressed, self.kept = eliminated([row * self.scale for row in slips(start)], len(x))
+        self.expressed, self.kept = eliminate([row * self.scale for row in slip_rows(start)], len(x))
         unknown = np.flatnonzero(free[self.kept])  # a drifting state may have any constant rate
         self.equations, self.moves = np.array(self.kept)[unknown], self.expressed[:, unknown]
 
-    def unlocked(self, state: np.ndarray) -> np.ndarray:
+    def express(self, state: np.ndarray) -> np.ndarray:
         """The state, with what is locked as the others have it."""
         return self.scale * (self.expressed @ (state / self.scale)[self.kept])
 
@@ -56,32 +56,37 @@ class Balance:
 
     def left(self, state: np.ndarray) -> np.ndarray:
         """Sizes of all rates that should be zero."""
-        return abs(np.where(self.free, self.unlocked(self.flow(state)) / self.scale, 0.0))
+        return abs(np.where(self.free, self.express(self.flow(state)) / self.scale, 0.0))
 
     def holds(self, state: np.ndarray) -> bool:
         """Whether nothing changes, but for rounding."""
         return bool((self.left(state) <= self.rounding(state)).all())
 
 
-def _turned(margins: Mapping[str, float], flanks: Mapping[str, int]) -> dict[str, int]:
+def _turn_flanks(system: HybridSystem, margins: np.ndarray, flanks: Mapping[str, int]) -> dict[str, int]:
     """The other flank where the present one does not hold; from a gap, the one that was passed or none."""
-    found = {}
+    violated = [event for event, margin in zip(system.events, margins, strict=True) if margin < 0]
+    passed: dict[str, list[int]] = {}
+    for event in violated:
+        if event.kind is EventKind.GAP:
+            passed.setdefault(event.at, []).append(event.side)
+    pushed_off = {event.at for event in violated if event.kind is EventKind.FORCE}
+    usual, found = usual_flanks(system), {}
     for name, flank in flanks.items():
-        broken = [side for side, sign in ((1, "+"), (-1, "-")) if margins.get(f"{name} flank {sign}", 0.0) < 0]
+        broken = passed.get(name, [])
         if flank == 0:
             found[name] = broken[0] if broken else 0
-        elif flank in broken or margins.get(f"{name} flank", 0.0) < 0:
-            found[name] = 0 if name.startswith(STOPS) else -flank
+        elif flank in broken or name in pushed_off:
+            found[name] = -flank if usual[name] else 0  # an end stop is left
         else:
             found[name] = flank
     return found
 
 
-def _freed(margins: Mapping[str, float], flanks: Mapping[str, int], found: Mapping[str, int]) -> dict[str, int]:
+def _open_gaps(system: HybridSystem, flanks: Mapping[str, int], found: Mapping[str, int]) -> dict[str, int]:
     """What has a gap stands in it, where it is pushed off one flank and off the other."""
-    return {
-        name: 0 if flank != flanks[name] and f"{name} flank +" in margins else flank for name, flank in found.items()
-    }
+    can_open = gaps(system)
+    return {name: 0 if flank != flanks[name] and name in can_open else flank for name, flank in found.items()}
 
 
 def trim(  # noqa: PLR0913 - what may be held and where to start are all choices of the user
@@ -125,29 +130,27 @@ def trim(  # noqa: PLR0913 - what may be held and where to start are all choices
     names = [quantity.name for quantity in system.states]
     require_known(drifting, names, "state")
     flanks: dict[str, int] = {}
-    if guess is None and contacts == "stuck":
+    if guess is None and contacts == STUCK:
         with contextlib.suppress(NoEquilibrium):  # without one, the search starts from zero
             before = trim(system, "forward", inputs=inputs, parameters=parameters, drifting=drifting)
             guess, flanks = before.states, before.flanks
     u, p = system.input_vector(inputs), system.parameter_values(parameters)
     x = system.state_vector(guess, p)
     free = np.array([name not in drifting for name in names])
-    flank_names = [name.removesuffix(".flank") for name in system.modes if name.endswith(".flank")]
-    usual = {name: usual_flank(name) for name in flank_names}
+    usual = usual_flanks(system)
     at_guess = system.margins(x, modes_of(system, contacts, usual), u, p).full().ravel()
-    stops = {name: 0 for name in flank_names if name.startswith(STOPS)}
-    flanks = usual | _turned(dict(zip(system.margin_names, at_guess, strict=True)), stops) | flanks
+    stops = {name: 0 for name, flank in usual.items() if flank == 0}
+    flanks = usual | _turn_flanks(system, at_guess, stops) | flanks
     tried = []
     for _ in range(2 + 2 * len(flanks)):
         m = modes_of(system, contacts, flanks)
-        x, rates = _newton(Balance(system, x, m, u, p, free), x)
+        x, rates = _solve(Balance(system, x, m, u, p, free), x)
         margins = system.margins(x, m, u, p).full().ravel()
-        named = dict(zip(system.margin_names, margins, strict=True))
-        found = _turned(named, flanks)
+        found = _turn_flanks(system, margins, flanks)
         if found == flanks:
             break
         tried.append(flanks)
-        flanks = _freed(named, flanks, found) if found in tried else found
+        flanks = _open_gaps(system, flanks, found) if found in tried else found
     if margins.size and margins.min() < HOLDS:
         m, rates, held = _held_by_others(Balance(system, x, m, u, p, free), x, rates)
         margins = np.zeros(1) if held else margins
@@ -166,27 +169,29 @@ def _held_by_others(balance: Balance, x: np.ndarray, rates: np.ndarray) -> tuple
     _, modes, fault = system.reset(np.zeros(len(system.margin_names)), x, m, u, p)
     after = np.round(modes.full().ravel())
     same = contact_labels(system, m) == contact_labels(system, after) and all(
-        before == now for name, before, now in zip(system.modes, m, after, strict=True) if name.endswith(".flank")
+        before == now
+        for mode, before, now in zip(system.mode_variables, m, after, strict=True)
+        if mode.kind is ModeKind.FLANK
     )
     taken = Balance(system, x, after, u, p, balance.free)
     if float(fault) or not same or not taken.holds(x):
         return m, rates, False
-    return after, taken.unlocked(taken.flow(x)), True
+    return after, taken.express(taken.flow(x)), True
 
 
-def _newton(balance: Balance, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _solve(balance: Balance, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """State and rates after least-norm Newton steps, damped until the residual falls.
 
     Where they do not arrive, as a limit has no slope that leads back, they go on from where time would lead.
     """
-    x = balance.unlocked(x)
+    x = balance.express(x)
     arrived = _steps(balance, x)
     if not balance.holds(arrived):
         with contextlib.suppress(np.linalg.LinAlgError):  # nowhere, where time leads to infinity
-            later = _steps(balance, _settled(balance, x))
+            later = _steps(balance, _settle(balance, x))
             if balance.holds(later):
-                return later, balance.unlocked(balance.flow(later))
-        system, rates = balance.system, balance.unlocked(balance.flow(arrived))
+                return later, balance.express(balance.flow(later))
+        system, rates = balance.system, balance.express(balance.flow(arrived))
         worst = np.argsort(-balance.left(arrived))[:3]
         named = dict(zip([quantity.name for quantity in system.states], rates, strict=True))
         text = ", ".join(f"d({system.states[i].name})/dt = {rates[i]:.4g} {system.states[i].unit}/s" for i in worst)
@@ -195,7 +200,7 @@ def _newton(balance: Balance, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             "Check the load against the torque and voltage limits, or let states that move steadily drift",
             named,
         )
-    return arrived, balance.unlocked(balance.flow(arrived))
+    return arrived, balance.express(balance.flow(arrived))
 
 
 def _steps(balance: Balance, state: np.ndarray) -> np.ndarray:
@@ -220,7 +225,7 @@ def _steps(balance: Balance, state: np.ndarray) -> np.ndarray:
     return state
 
 
-def _settled(balance: Balance, state: np.ndarray) -> np.ndarray:
+def _settle(balance: Balance, state: np.ndarray) -> np.ndarray:
     """After steps of implicit Euler, each twice as long as the one before."""
     for duration in SETTLING:
         matrix = np.eye(len(balance.equations)) / duration - balance.slopes(state)

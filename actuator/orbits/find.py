@@ -65,7 +65,7 @@ def find_orbit(
         return find_sampled(system, run, *_cycle_at_end(system, run, inputs, parameters), compiled=compiled)
     period, u, p = _cycle_at_end(system, run, inputs, parameters)
     machine = flow_map(system, tolerance, compiled)
-    x, m = system.state_vector(run.state()), machine.words(run.mode_values[:, -1])
+    x, m = system.state_vector(run.state()), machine.integer_modes(run.mode_values[:, -1])
     x, m = find_return(machine, x, m, u, p, period)
     return close(machine, x, m, u, p, period, segments=segments)
 

@@ -72,13 +72,13 @@ def _walk(function: ca.Function, arguments: list[ca.SX], sides: ca.SX | None) ->
             if corner is not None and ca.depends_on(corner, arguments[0]):
                 corners.append(corner)
                 if sides is not None:
-                    work[written[0]] = _held(operation, values, sides[len(corners) - 1] > 0)
+                    work[written[0]] = _one_side(operation, values, sides[len(corners) - 1] > 0)
                     continue
             work[written[0]] = (ca.SX.unary if len(values) == 1 else ca.SX.binary)(operation, *values)
     return results, corners
 
 
-def _held(operation: int, values: list[ca.SX], above: ca.SX) -> ca.SX:
+def _one_side(operation: int, values: list[ca.SX], above: ca.SX) -> ca.SX:
     """The operation on one side of its corner."""
     if operation == ca.OP_FMAX:
         return ca.if_else(above, values[0], values[1])
@@ -118,7 +118,6 @@ class FlowMap:
         self.system, self.tolerance, self.compiled = system, tolerance, compiled
         self.nominal = np.array([state.nominal for state in system.states])
         self.nx, self.grid = len(system.states), GRID
-        contacts = [contact.name for contact in system.contacts]
         x, m, u, p = (ca.SX.sym(name, system.flow.size1_in(k)) for k, name in enumerate("xmup"))
         both = [system.flow(x, m, u, p), system.margins(x, m, u, p) - MARGIN_BAND]
         smooth = hold_corners(ca.Function("both", [x, m, u, p], both, {"cse": True}))
@@ -140,8 +139,8 @@ class FlowMap:
         given = [ca.MX.sym(f"given{k}", system.reset.size1_in(k)) for k in range(system.reset.n_in())]
         after = ca.Function("after", given, system.reset.call(given, True, False)[:1])
         self.reset_tangent = fast(after.forward(BLOCK))
-        flanks = {name.removesuffix(".flank"): k for k, name in enumerate(system.modes) if name.endswith(".flank")}
-        self._free = [(system.modes.index(f"{name}.motion"), k) for name, k in flanks.items() if name in contacts]
+        names = system.modes
+        self._free = [(names.index(c.motion), names.index(c.flank)) for c in system.contacts if c.flank]
 
     def _segment(self, name: str, flow: ca.Function, grid: list[float], options: dict) -> ca.Function:
         """(x, m, u, p, duration) -> states at the parts `grid` of the duration, in fixed modes."""
@@ -164,13 +163,13 @@ class FlowMap:
 
     def advance(self, x: np.ndarray, m: Sequence[int], u: np.ndarray, p: np.ndarray, duration: float) -> np.ndarray:
         """State after `duration` in the modes and sides m."""
-        return self._called(self._end, x, m, u, p, duration).ravel()
+        return self._call(self._end, x, m, u, p, duration).ravel()
 
     def path(self, x: np.ndarray, m: Sequence[int], u: np.ndarray, p: np.ndarray, duration: float) -> np.ndarray:
         """States on POINTS + 1 output points, (nx, POINTS + 1)."""
-        return np.column_stack([x, self._called(self._path, x, m, u, p, duration)])
+        return np.column_stack([x, self._call(self._path, x, m, u, p, duration)])
 
-    def _called(self, function: ca.Function, *arguments: object) -> np.ndarray:
+    def _call(self, function: ca.Function, *arguments: object) -> np.ndarray:
         try:
             # CasADi's own words are not wanted
             with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
@@ -181,7 +180,7 @@ class FlowMap:
                 f"{self.tolerance:g}: {str(error).strip().splitlines()[-1]}"
             ) from error
 
-    def words(self, m: Sequence[float] | np.ndarray) -> tuple[int, ...]:
+    def integer_modes(self, m: Sequence[float] | np.ndarray) -> tuple[int, ...]:
         """Modes as integers; a mesh in its gap has no motion of its own, and what rounding says of it is dropped."""
         modes = [round(float(mode)) for mode in m]
         for motion, flank in self._free:

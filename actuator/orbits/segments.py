@@ -124,7 +124,7 @@ def passage(
         if count:
             known = [fired, before, modes, u, p, after]
             moved = directional(machine.reset_tangent, known, [no_fired, moved, none[1], none[2], seed_p])
-        x, modes = after, machine.words(decided)
+        x, modes = after, machine.integer_modes(decided)
     return Passage(tuple(found), tuple(starts), x, modes, machine.rate(x, modes, u, p), moved, delayed)
 
 
@@ -171,9 +171,9 @@ def cut_motion(
     window = runs.run(0.0, duration, x, np.array(m, float), p, [Piece(float(value)) for value in u])
     found: list[Segment] = []
     states: list[np.ndarray | None] = []
-    modes, began = machine.words(m), 0.0
+    modes, began = machine.integer_modes(m), 0.0
     for time, raw in window.events:
-        after = machine.words(raw)
+        after = machine.integer_modes(raw)
         if time <= began or after == modes:
             continue
         # lengths by the engine's clock: a slip may be shorter than two engines agree on when it began

@@ -91,7 +91,7 @@ def predict_breakaway(
     if moving or not labels:
         raise NotAtRest(f"{system.name}: stiction does not hold this state: {', '.join(moving) or 'nothing sticks'}")
     machine = flow_map(system, compiled=compiled)
-    time, name = _drift(machine, x, machine.words(m), u, p)
+    time, name = _drift(machine, x, machine.integer_modes(m), u, p)
     return BreakawayPrediction(
         system=system,
         holds=_holds(system, x, m, u, p),
@@ -141,7 +141,7 @@ def _drift(machine: FlowMap, x: np.ndarray, m: tuple[int, ...], u: np.ndarray, p
         for time, after in window.events:
             if not is_at_rest(list(contact_labels(machine.system, after).values())):
                 return _exactly(machine, x, m, u, p, float(time), passed)
-        x, m, passed, length = window.end[0], machine.words(window.end[1]), passed + length, 2 * length
+        x, m, passed, length = window.end[0], machine.integer_modes(window.end[1]), passed + length, 2 * length
     return float("inf"), ""
 
 

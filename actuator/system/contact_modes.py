@@ -10,6 +10,7 @@ import numpy as np
 from actuator.system.hybrid import HybridSystem
 
 STUCK, FORWARD, BACKWARD, FREE = "stuck", "forward", "backward", "free"
+MOTIONS = {STUCK: 0, FORWARD: 1, BACKWARD: -1}  # of a contact that is not in its gap
 LABELS = {0: STUCK, 1: FORWARD, -1: BACKWARD, 2: STUCK, -2: STUCK}  # +-2: stuck at its limit, held by others
 
 

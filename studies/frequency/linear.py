@@ -12,8 +12,8 @@ from actuator import (
     ModeModels,
     Poles,
     lifted_margins,
+    linearize_modes,
     margins,
-    mode_models,
     poles,
 )
 from actuator.linear.margins.sensitivity import Peak, Sensitivities, peak_of, sensitivities
@@ -67,7 +67,7 @@ def linearize_case(actuator: Actuator, inputs: Mapping[str, float]) -> LinearPar
     NoEquilibrium
         Where no mode can be reached.
     """
-    models = mode_models(actuator, inputs=inputs)
+    models = linearize_modes(actuator, inputs=inputs)
     loops: dict[str, Mapping[str, control.StateSpace]] = {}
     missing: dict[str, str] = {}
     for quantity in models.models[0].point.system.inputs:
@@ -107,4 +107,4 @@ def closed_loop_at(
         Where no mode can be reached.
     """
     biased = {**inputs, LOAD: inputs.get(LOAD, 0.0) + place.bias}
-    return mode_models(actuator, inputs=biased, parameters=sets[place.corner]).responses("reference", OUTPUT)
+    return linearize_modes(actuator, inputs=biased, parameters=sets[place.corner]).responses("reference", OUTPUT)

@@ -24,7 +24,7 @@ from actuator import (
     margins,
     simulate,
     trim,
-    without_counts,
+    without_quantization,
 )
 from actuator.diagnosis.causes import Causes, find_causes
 from actuator.diagnosis.countermeasures import Remedy, RemedySearch, RemedyTable
@@ -33,12 +33,13 @@ from actuator.orbits.sampled import PeriodicOrbit, SampledOrbit
 from actuator.simulation.many import processes
 from actuator.simulation.signals import piece_at
 from actuator.stiction.margins import HuntingMargin, MarginKind, find_scaled, hunting_margin
+from actuator.system.contact_modes import MOTIONS
 from actuator.verdict.verdict import DIVERGING
 from gear.quantities.roles import LoopSignal
 from studies.cache import CONVERTER, StepError, Steps, fingerprint
 from studies.cases import Case
 
-MODES = ("stuck", "forward", "backward")
+MODES = tuple(MOTIONS)
 RESOLUTION = 2e-3  # s
 PATIENCE = 1.5  # s of computing that a run may take where a hundred of them follow
 SIMULATED, MODELED = 0.05, 0.1  # shares of the work when the run and the linear models are done
@@ -254,7 +255,7 @@ class _Inquiry:
 
 
 def _model(case: Case, mode: str, inputs: dict[str, float]) -> LinearModel:
-    system = without_counts(case.actuator).system()
+    system = without_quantization(case.actuator).system()
     signals = [role.signal for quantity in system.inputs if (role := quantity.role(LoopSignal))]
     try:
         point = trim(system, mode, inputs=inputs)

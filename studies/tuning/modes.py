@@ -7,7 +7,7 @@ import numpy as np
 
 from actuator.actuator import Actuator
 from actuator.linear.jacobians import rates_function, rounding
-from actuator.linear.modes import ModeModel, mode_models
+from actuator.linear.modes import ModeModel, linearize_modes
 from actuator.linear.operating_point import NoEquilibrium, OperatingPoint
 from actuator.linear.trim import trim
 from actuator.system.contact_modes import FREE, STUCK
@@ -65,7 +65,7 @@ def corner_modes(plant: Actuator, corner: Corner, stiction: float, start: Mappin
     values = defaults_of(system.parameters)
     # a corner may name what linear models are without: the counts of a sensor
     parameters = {name: value for name, value in corner.parameters.items() if name in values} | dict(start)
-    found = mode_models(system, parameters=parameters)
+    found = linearize_modes(system, parameters=parameters)
     moving = [model for model in found if model.name != STUCK]
     points = {model.name: model.point for model in moving}
     sliding = {model.name: _left_by(model, moving).name for model in moving}

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from actuator.actuator import Actuator
-from actuator.linear.sampled import without_counts
+from actuator.linear.sampled import without_quantization
 from actuator.system.hybrid import HybridSystem
 from actuator.system.parameters import Parameter, with_values
 from controllers.controller import Controller, integrating_law, prefix_of_integral
@@ -103,7 +103,7 @@ def prepare_linear(plant: Actuator) -> Actuator:
     def changed(remedies: IntegralRemedies | None) -> IntegralRemedies | None:
         return None if remedies is None else replace(remedies, dead_band=None)
 
-    return without_counts(_with_remedies(plant, changed))
+    return without_quantization(_with_remedies(plant, changed))
 
 
 def add_dead_band(plant: Actuator) -> Actuator:

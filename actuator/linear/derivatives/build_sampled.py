@@ -12,12 +12,12 @@ import numpy as np
 from scipy.linalg import expm, expm_frechet
 
 from actuator.linear.derivatives.sampled import SampledGainModel
-from actuator.linear.derivatives.slopes import along, flow_slopes, places, point_moves, split, symbols
+from actuator.linear.derivatives.slopes import along, flow_slopes, indices_of, point_sensitivity, split, symbols
 from actuator.linear.jacobians import require_smooth
 from actuator.linear.loop import ticks_between
 from actuator.linear.operating_point import OperatingPoint
-from actuator.system.builder import PREFIX
 from actuator.system.hybrid import HybridSystem
+from gear.quantities.roles import LoopSignal
 
 SAME = 1e-13  # relative change of what flows between ticks that is none
 
@@ -43,8 +43,8 @@ def sampled_gain_model(
     if not system.clocks:
         raise ValueError(f"{system.name}: sampled_gain_model takes sampled controllers; gain_model is for the others")
     require_smooth(system)
-    where, picked = places(system, gains, inputs, outputs)
-    moves, base = point_moves(resting or point, where), system.tick_period(point.p)
+    where, picked = indices_of(system, gains, inputs, outputs)
+    moves, base = point_sensitivity(resting or point, where), system.tick_period(point.p)
     n, k = len(point.x), len(inputs)
     scale = np.array([quantity.nominal for quantity in system.states])
     (a, b, c, d), (da, db, dc, dd) = flow_slopes(point, where, picked, moves, scale)
@@ -84,7 +84,8 @@ def sampled_gain_model(
         seen.append((c @ state, direct, dc @ state + c @ of_state, of_direct))
         through(between[:n, :n], between[:n, n:], changes[:, :n, :n], changes[:, :n, n:], now)
     of_states, direct, of_states_changed, direct_changed = (np.array(part) for part in zip(*seen, strict=True))
-    injected = [name.removeprefix(PREFIX) for name in inputs if name.startswith(PREFIX)]
+    named = {quantity.name: quantity for quantity in system.inputs}
+    injected = [role.signal for name in inputs if (role := named[name].role(LoopSignal))]
     return SampledGainModel(
         gains=tuple(gains),
         given=tuple(inputs),

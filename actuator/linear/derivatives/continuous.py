@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import expm, expm_frechet
 
-from actuator.linear.derivatives.slopes import flow_slopes, places, point_moves
+from actuator.linear.derivatives.slopes import flow_slopes, indices_of, point_sensitivity
 from actuator.linear.jacobians import require_smooth
 from actuator.linear.operating_point import OperatingPoint
 
@@ -160,9 +160,9 @@ def gain_model(
             f"{system.name}: gain_model takes controllers in continuous time; sampled_gain_model is for the others"
         )
     require_smooth(system)
-    where, picked = places(system, gains, inputs, outputs)
+    where, picked = indices_of(system, gains, inputs, outputs)
     scale = np.array([quantity.nominal for quantity in system.states])
-    (a, b, c, d), slopes = flow_slopes(point, where, picked, point_moves(resting or point, where), scale)
+    (a, b, c, d), slopes = flow_slopes(point, where, picked, point_sensitivity(resting or point, where), scale)
     return GainModel(
         gains=tuple(gains), given=tuple(inputs), seen=tuple(outputs), a=a, b=b, c=c, d=d, slopes=tuple(slopes)
     )

@@ -14,7 +14,7 @@ from gear.quantities import require_known
 Picked = tuple[tuple[int, ...], tuple[int, ...]]  # places of outputs (or states) and of inputs
 
 
-def places(
+def indices_of(
     system: HybridSystem, gains: Sequence[str], inputs: Sequence[str], outputs: Sequence[str]
 ) -> tuple[tuple[int, ...], Picked]:
     """Places of parameters, and of outputs and inputs, by their names; KeyError where there is none."""
@@ -27,7 +27,7 @@ def places(
     return where, (tuple(rows.index(name) for name in outputs), tuple(columns.index(name) for name in inputs))
 
 
-def point_moves(point: OperatingPoint, where: tuple[int, ...]) -> np.ndarray:
+def point_sensitivity(point: OperatingPoint, where: tuple[int, ...]) -> np.ndarray:
     """dx0/dp of the operating point, (states, gains), of least norm in nominal sizes: F_x dx0 + F_p = 0."""
     of_state, of_gains = (part.full() for part in _of_rates(point.system, where)(point.x, point.m, point.u, point.p))
     scale = np.array([quantity.nominal for quantity in point.system.states])

@@ -8,7 +8,7 @@ import control
 import numpy as np
 from scipy.optimize import brentq
 
-from actuator.linear.poles import room
+from actuator.linear.poles import rounding_bound
 
 GAINS = np.logspace(-4, 4, 1601)  # factors on the loop gain that are tried
 PHASES = np.linspace(0, math.pi, 721)  # rad
@@ -57,7 +57,7 @@ def lifted_margins(loop: control.StateSpace) -> LiftedMargins:
 
     def spare(factor: complex) -> float:
         """How far inside the unit circle the slowest closed pole is."""
-        return room(a - factor * b @ np.linalg.solve(one + factor * d, c), discrete=True)
+        return rounding_bound(a - factor * b @ np.linalg.solve(one + factor * d, c), discrete=True)
 
     step = np.exp(1j * np.linspace(0, math.pi, FREQUENCIES + 1)[1:])
     loops = np.asarray(loop(step)).reshape(*d.shape, -1)

@@ -7,7 +7,7 @@ import control
 import numpy as np
 from scipy.optimize import brentq
 
-from actuator.linear.poles import room
+from actuator.linear.poles import rounding_bound
 
 NOTHING = 1e-9  # loop gain of a loop that is not there: a stuck gear passes nothing on; of an integrator, its inverse
 GRID = np.logspace(-6, 6, 6001)  # rad/s, on which crossings are bracketed
@@ -112,7 +112,7 @@ class LoopResponse:
 
     def stable(self) -> bool:
         """Whether the closed loop, 1/(1 + L), is."""
-        return room(self.a - self.b @ self.c / (1 + self.d.item()), discrete=self.step > 0) >= 0
+        return rounding_bound(self.a - self.b @ self.c / (1 + self.d.item()), discrete=self.step > 0) >= 0
 
     def roots(
         self, of: Callable[[np.ndarray], np.ndarray], frequencies: np.ndarray, values: np.ndarray, doubts: np.ndarray

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 import numpy as np
 
 from controllers.compensation import Dither, FrictionCompensation, Knocker
-from controllers.controller import Controller, CurrentControl, Loop, Plant
+from controllers.controller import Controller, CurrentControl, Plant
 from controllers.countermeasures import (
     COMPENSATED,
     OVER,
@@ -21,6 +21,7 @@ from controllers.countermeasures import (
 )
 from controllers.feedforward import FeedForward
 from controllers.filters import Filter, LowPass, Notch
+from controllers.loop import Loop
 from controllers.observer import DisturbanceObserver, PositionObserver, SpeedEstimator
 from controllers.pid import ANGLE, PI, P, never_reset, proportional_part, require_no_reset
 from controllers.reference import Motion, RateAndAccelerationLimit, ReferenceLimit

@@ -6,12 +6,13 @@ say it does not have: each analysis that asks for more is refused by name.
 """
 
 from abc import abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
+from controllers.loop import Loop
 from gear.quantities import Scalar
 
 if TYPE_CHECKING:
@@ -36,53 +37,6 @@ class PlantMotion:
     load_angle: Scalar  # rad
     load_speed: Scalar  # rad/s
     ratio: float  # motor turns per load turn
-
-
-class Loop(Protocol):
-    """Where the laws of one control loop run: in continuous time, or once at every tick that is due."""
-
-    period: Scalar  # s; None in continuous time
-
-    @property
-    def sampled(self) -> bool:
-        """Whether the loop runs at ticks."""
-        ...
-
-    def state(self, name: str, unit: str, nominal: float = 1.0, initial: Scalar = 0.0) -> Any:
-        """Declare one number that a law keeps."""
-        ...
-
-    def memory(self, path: str, law: Any, *kind: Any, first: Scalar = 0.0) -> list[Any]:
-        """Declare what a law with memory keeps; the first of it begins at `first`."""
-        ...
-
-    def output(self, law: Any, memory: Sequence[Any], *inputs: Scalar) -> Scalar:
-        """The value of a law with memory, in the form of this loop."""
-        ...
-
-    def remember(self, law: Any, memory: Sequence[Any], *inputs: Scalar) -> None:
-        """How the memory of a law goes on."""
-        ...
-
-    def integrate(self, law: Any, memory: Sequence[Any], error: Scalar, proposed: Scalar, realized: Scalar) -> None:
-        """The integral of a law, driven by its error and by what was realized of its output."""
-        ...
-
-    def after(self, state: Any, rate: Callable[[], Scalar], after: Callable[[], Scalar]) -> None:
-        """How a state goes on: its rate in continuous time, or what it is after a tick."""
-        ...
-
-    def signal(self, name: str, unit: str, computed: Scalar) -> Any:
-        """A named signal of the loop, where it can be opened: held between ticks, with what is injected there."""
-        ...
-
-    def apply(self, name: str, unit: str, computed: Scalar) -> Any:
-        """A named signal that acts on the plant: held and delayed, with what is injected there."""
-        ...
-
-    def hold(self, name: str, unit: str, computed: Scalar) -> tuple[Any, Any]:
-        """A result at a tick, for the laws that run then, and as it stands between ticks."""
-        ...
 
 
 class Plant(Protocol):

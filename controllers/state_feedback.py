@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import expm
 from scipy.signal import place_poles
 
-from controllers.controller import Controller, CurrentControl, Loop, Plant
+from controllers.controller import Controller, CurrentControl, Plant
 from controllers.countermeasures import (
     Countermeasure,
     StickingCycle,
@@ -19,6 +19,7 @@ from controllers.countermeasures import (
 )
 from controllers.filters import LowPass
 from controllers.integral import AntiWindup, IntegralRemedies, advance_integral, memory_of, rate_of
+from controllers.loop import Loop
 from controllers.observer import SpeedEstimator
 from controllers.pid import ANGLE, PI, never_reset, require_no_reset
 from controllers.sampling import Sampling

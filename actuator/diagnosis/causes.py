@@ -1,7 +1,7 @@
 """Why it hunts: the energy each element gives per cycle, and the same run with one cause removed."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -183,7 +183,7 @@ def removals(plant: Actuator, parameters: Mapping[str, float] | None = None) -> 
         ideal = replace(plant, sampling=None, sensors=Sensors(), controller=plant.controller.in_continuous_time())
         found[SAMPLING] = Removal(ideal, _kept(given, ideal), "controller in continuous time, sensors ideal")
     if system.parameters_having(Resolution):
-        smooth = replace(plant, sensors=_without_quantization(plant.sensors))
+        smooth = replace(plant, sensors=plant.sensors.with_each(resolution=None))
         found[COUNTS] = Removal(smooth, _kept(given, smooth), "sensors without resolution")
     return found
 
@@ -195,13 +195,6 @@ def _none_of(system: HybridSystem, gain: Parameter) -> float:
     except ValueError:
         return NEARLY_NONE * gain.default
     return 0.0
-
-
-def _without_quantization(sensors: Sensors) -> Sensors:
-    """The same sensors without resolution."""
-    given = {field.name: getattr(sensors, field.name) for field in fields(sensors)}
-    smooth = {name: replace(sensor, resolution=None) for name, sensor in given.items() if sensor is not None}
-    return replace(sensors, **smooth)
 
 
 def _kept(parameters: Mapping[str, float], plant: Actuator) -> dict[str, float]:

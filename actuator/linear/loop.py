@@ -9,8 +9,8 @@ import numpy as np
 from actuator.linear.model import build_model, linearize, require_still, select
 from actuator.linear.operating_point import OperatingPoint
 from actuator.linear.sampled import lift
-from actuator.system.builder import PREFIX
 from actuator.system.hybrid import HybridSystem
+from controllers.loop import PREFIX
 from gear.quantities import require_known
 from gear.quantities.roles import LoopSignal
 

@@ -11,10 +11,11 @@ from actuator.parts.dc_link import DCLink
 from actuator.parts.inverter import Inverter
 from actuator.parts.park import rotate
 from actuator.parts.temperature import MotorTemperature
-from actuator.system.builder import PREFIX, Loop, SystemBuilder
+from actuator.system.builder import SystemBuilder
 from actuator.system.parameters import unchecked
 from controllers.controller import CurrentControl, PlantMotion
 from controllers.current_reference import CurrentReference
+from controllers.loop import PREFIX, Loop
 from controllers.shapes import saturate
 from gear.quantities import Scalar
 from gear.quantities.roles import LoopSignal

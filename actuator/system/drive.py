@@ -12,9 +12,10 @@ from typing import Any
 import casadi as ca
 
 from actuator.parts.temperature import MotorTemperature
-from actuator.system.builder import Loop, SystemBuilder
+from actuator.system.builder import SystemBuilder
 from actuator.system.current_loop import MotorDrive
 from controllers.controller import Controller, PlantMotion
+from controllers.loop import Loop
 from controllers.sampling import Sampling
 from gear.quantities import Scalar, require_known
 
@@ -107,7 +108,7 @@ class DriveContext:
         """What motor and inverter can give of a torque at the motor [N m]."""
         return self._motor.allow_torque(torque, motor_speed)
 
-    def actuate(self, loop: Any, torque: Scalar, motor_speed: Scalar, motor_angle: Scalar) -> Scalar:
+    def actuate(self, loop: Loop, torque: Scalar, motor_speed: Scalar, motor_angle: Scalar) -> Scalar:
         """Torque on the motor's shaft [N m] from a torque reference, the measured speed and angle of the motor."""
         return self._motor.shaft_torque(loop, torque, motor_speed, motor_angle)
 

@@ -12,7 +12,7 @@ from actuator.linear.derivatives.build_sampled import sampled_gain_model
 from actuator.linear.derivatives.continuous import GainModel, Response, gain_model
 from actuator.linear.derivatives.sampled import SampledGainModel
 from actuator.linear.operating_point import OperatingPoint
-from actuator.system.builder import PREFIX
+from controllers.loop import PREFIX
 from studies.tuning.plant import loops_of
 
 FREQUENCIES = 2 * np.pi * np.logspace(-1.5, 3.5, 240)  # rad/s

@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 from actuator.linear.derivatives.continuous import Response, Value
-from actuator.system.builder import PREFIX
+from controllers.loop import PREFIX
 
 ROUNDING = 1e-6  # by which a pole may lie outside the unit circle: free bodies have two at one
 

@@ -93,10 +93,7 @@ def test_an_import_inside_a_function_is_seen():
 # -- circles and pictures -----------------------------------------------------------------------------------
 
 MODULES = {".".join(file.with_suffix("").parts): file for file in FILES}
-DRAW = {
-    "actuator": ("actuator/plots/*.py",),
-    "studies": ("studies/*/pictures.py", "studies/checks/*.py", "studies/robustness/study.py"),
-}
+DRAW = {"actuator": ("actuator/plots/*.py",), "studies": ("studies/*/pictures.py",)}
 
 
 def run_time_imports(tree, late):

@@ -17,6 +17,7 @@ from studies.checks.cross_check_drive import check_drive
 from studies.checks.cross_check_record import Recorded, WrongRecord
 from studies.checks.cross_check_record import recorded as read_drive
 from studies.checks.deviation import Deviation, table
+from studies.checks.pictures import plot_drive, plot_machine, plot_rod
 from studies.findings import Findings, png
 
 ACTUATOR_FILE, DRIVE_FILE = "dymola_result.csv", "reference.npz"
@@ -68,11 +69,11 @@ def run_cross_check(
             f"{check.noisy.statistics.wall_s:.2f} s ({len(check.noisy.changes)} changes of modes), and "
             f"{check.clean.statistics.wall_s:.2f} s without noise."
         )
-        return Checked(check.rows(), {"cross_check_actuator": png(check.picture())}, [sentence])
+        return Checked(check.rows(), {"cross_check_actuator": png(plot_rod(check))}, [sentence])
 
     def drive() -> Checked:
         check = check_drive(records.drive)
-        pictures = {"cross_check_machine": check.machine_picture(), "cross_check_drive": check.drive_picture()}
+        pictures = {"cross_check_machine": plot_machine(check), "cross_check_drive": plot_drive(check)}
         return Checked(check.rows(), {name: png(figure) for name, figure in pictures.items()}, [])
 
     found = [steps.compute("Dymola's actuator", Checked, actuator)]

@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from actuator import Actuator, CurrentSource, LinearLoad, Rack, Run, Staircase, Step, WhiteNoise, simulate
 from controllers import PI, Cascade, FilteredDerivative, RateLimit
@@ -49,7 +48,6 @@ NOISE, NOISE_PERIOD = 0.01, 5e-3  # rad, s
 TEETH = 1e7  # N m/rad at the wheel
 WHEEL = 1e-3  # kg m^2; LossyGear has no inertia, the rotors are 58 there
 ALLOWED = 1e-3  # of the travel
-COLORS = ("#4d4d4d", "#3b75af", "#e1812c")
 
 
 class Recorded(NamedTuple):
@@ -176,30 +174,6 @@ class ActuatorCheck(NamedTuple):
                 ("rod with noise against without", float(np.abs(self.moved()).max())),
             )
         ]
-
-    def picture(self) -> Figure:
-        """Both positions, and their deviations."""
-        figure = Figure(figsize=(9, 6), layout="constrained")
-        above, below = figure.subplots(2, 1, sharex=True)
-        above.plot(self.clean.t, 1e3 * rod(self.clean), color=COLORS[1], label="here, without noise")
-        above.plot(
-            self.theirs.time, 1e3 * self.theirs.position, ".", color=COLORS[0], markersize=4, label="Dymola, with noise"
-        )
-        above.set_ylabel("rod position in mm")
-        above.legend(loc="lower right", fontsize="small")
-        below.plot(self.noisy.t, 1e6 * self.moved(), color=COLORS[2], lw=0.5, label="here, with noise less without")
-        below.plot(
-            self.theirs.time, 1e6 * self.deviation(), ".", color=COLORS[0], markersize=4, label="here less Dymola"
-        )
-        for side in (-1, 1):
-            label = f"limit: {100 * ALLOWED:g} % of {1e3 * TRAVEL:.4g} mm" if side > 0 else None
-            below.axhline(side * 1e6 * ALLOWED * TRAVEL, color=COLORS[0], linestyle="--", lw=0.8, label=label)
-        below.set_ylabel("deviation in um")
-        below.set_xlabel("time in s")
-        below.legend(loc="lower right", fontsize="small", bbox_to_anchor=(1.0, 0.08))
-        for axes in (above, below):
-            axes.grid(alpha=0.3)
-        return figure
 
 
 def check_actuator(theirs: Recorded, progress: Callable[[float], None]) -> ActuatorCheck:

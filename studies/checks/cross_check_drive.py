@@ -18,7 +18,6 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from matplotlib.figure import Figure
 
 from actuator import PMSM, Actuator, Inverter, Run, Step, simulate
 from actuator.parts.park import to_axes
@@ -54,7 +53,6 @@ CURRENT_BANDWIDTH, REFERENCE_BANDWIDTH, SPEED_BANDWIDTH, OBSERVER_BANDWIDTH = (
 )
 STEPS = 2  # Runge-Kutta steps per period; twice as many change the currents by less than 1e-7 of their peaks
 MACHINE_ALLOWED, DRIVE_ALLOWED = 1e-3, 3e-2  # of the peaks, of the key figures
-COLORS = ("#4d4d4d", "#3b75af", "#e1812c", "#5a8f3c")
 
 
 # -- the machine ------------------------------------------------------------------------------------------
@@ -156,7 +154,7 @@ class DriveCheck(NamedTuple):
                 what=f"machine on recorded voltages: {name}, {self._count()} samples",
                 unit=unit,
                 theirs=self.theirs.peaks[name],
-                deviation=max(float(np.abs(error).max()) for error in self._errors(name)),
+                deviation=max(float(np.abs(error).max()) for error in self.errors(name)),
                 allowed=MACHINE_ALLOWED,
             )
             for name, unit in SIGNALS.items()
@@ -176,74 +174,11 @@ class DriveCheck(NamedTuple):
     def _count(self) -> int:
         return sum(len(excerpt.samples) for excerpt in self.theirs.excerpts)
 
-    def _errors(self, name: str) -> list[np.ndarray]:
+    def errors(self, name: str) -> list[np.ndarray]:
+        """Of the machine, less theirs, per excerpt."""
         return [
             ours[name] - excerpt.signals[name] for ours, excerpt in zip(self.machine, self.theirs.excerpts, strict=True)
         ]
-
-    def machine_picture(self) -> Figure:
-        """Signals over their peaks and their deviations, per excerpt."""
-        excerpts = self.theirs.excerpts
-        figure = Figure(figsize=(9, 6), layout="constrained")
-        panels = figure.subplots(2, len(excerpts), sharex="col", sharey="row", squeeze=False)
-        for k, excerpt in enumerate(excerpts):
-            time = 1e3 * (excerpt.begin + PERIOD * excerpt.samples)
-            above, below = panels[:, k]
-            for (name, peak), color in zip(self.theirs.peaks.items(), COLORS, strict=True):
-                above.plot(
-                    time, self.machine[k][name] / peak, color=color, label=f"{_words(name)}, {peak:.4g} {SIGNALS[name]}"
-                )
-                few = slice(None, None, max(1, len(time) // 80))
-                above.plot(
-                    time[few], excerpt.signals[name][few] / peak, "o", color=color, markersize=3, fillstyle="none"
-                )
-                below.plot(time, 1e6 * self._errors(name)[k] / peak, color=color, label=_words(name))
-            below.set_xlabel("time in ms")
-            for axes in (above, below):
-                axes.grid(alpha=0.3)
-        panels[0, 0].set_ylabel("signal over its peak")
-        panels[1, 0].set_ylabel(f"deviation in 1e-6\nof the peak (limit {1e6 * MACHINE_ALLOWED:g})")
-        panels[0, -1].legend(title="peaks (circles: motulator)", fontsize="small", title_fontsize="small")
-        panels[1, 0].legend(fontsize="small")
-        return figure
-
-    def drive_picture(self) -> Figure:
-        """Speed, torque and currents of both drives, and their deviations."""
-        ours, theirs = signals_of(self.run), self.theirs
-        figure = Figure(figsize=(9, 7.5), layout="constrained")
-        speed, torque, current, error = figure.subplots(4, 1, sharex=True)
-        for axes, names, label in (
-            (speed, ("speed",), "speed in rad/s"),
-            (torque, ("torque",), "torque in N m"),
-            (current, ("current_d", "current_q"), "current in A"),
-        ):
-            for name in names:
-                color = COLORS[list(SIGNALS).index(name)]
-                axes.plot(self.run.t, ours[name], color=color, label=f"{_words(name)}, here")
-                axes.plot(
-                    theirs.time,
-                    theirs.curves[name],
-                    "--",
-                    color=color,
-                    lw=2.5,
-                    alpha=0.5,
-                    label=f"{_words(name)}, motulator",
-                )
-            axes.set_ylabel(label)
-        for (name, peak), color in zip(theirs.peaks.items(), COLORS, strict=True):
-            between = np.interp(theirs.time, self.run.t, ours[name]) - theirs.curves[name]
-            error.plot(theirs.time, 100 * between / peak, color=color, label=_words(name))
-        error.set_yscale("symlog", linthresh=1.0)
-        error.set_ylabel("deviation in %\nof the peak")
-        error.set_xlabel("time in s")
-        for axes in (speed, torque, current, error):
-            axes.grid(alpha=0.3)
-            axes.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
-        return figure
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")
 
 
 def check_drive(theirs: Recorded) -> DriveCheck:

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from scipy.optimize import brentq
 
 from actuator import Run, simulate
@@ -39,6 +38,7 @@ from gear.friction.tabulated_efficiency import EfficiencyPoint
 from gear.motion import Sliding
 from studies.cache import Steps
 from studies.checks.paper import figure_9, figure_9_inputs, figure_9_start
+from studies.checks.pictures import RigCurve, plot_deformation, plot_elasticities, plot_friction
 from studies.findings import Findings, png
 
 PAIR = ExternalPair(teeth_a=20, teeth_b=60, module=1e-3)
@@ -55,12 +55,10 @@ RIG = {  # the paper's Tables 3 and 4 and text
     "train stiffness": 2e7,  # N/m at the contact; the paper subtracts one and does not print it
 }
 CONTACT = RIG["stiffness per width"] * EFFECTIVE * FACE_WIDTH  # N/m
-COLORS = ("#4d4d4d", "#3b75af", "#e1812c")
 ROUGH = 5e-6  # m; where the ISO law becomes linear, for the picture
 DEFLECTIONS = np.linspace(-20e-6, 20e-6, 401)
 LOADS = np.concatenate([np.linspace(-12.0, -0.2, 60), np.linspace(0.2, 12.0, 60)])  # N m on wheel B
 FLANKS = (slice(0, 60), slice(60, None))  # of LOADS
-QUADRANTS = {(1, 1): 1, (1, -1): 2, (-1, 1): 3, (-1, -1): 4}  # (sign of v, sign of F_n)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,21 +93,13 @@ def figure_7() -> Figures:
     }
     gaps = {f"{name}, backlash": Backlash(gap=RIG["gap"], law=spring) for name, spring in springs.items()}
     data = elasticity_curves({**springs, **gaps}, DEFLECTIONS)
-    figure = Figure(figsize=(9, 4.2), layout="constrained")
-    panels = figure.subplots(1, 2)
-    for axes, what, scale, label in zip(
-        panels, ("force", "stiffness"), (1, 1e-6), ("normal force in N", "stiffness in N/um"), strict=True
-    ):
-        for name, color in zip(springs, COLORS, strict=True):
-            for law, style in ((name, "-"), (f"{name}, backlash", "--")):
-                axes.plot(1e6 * DEFLECTIONS, scale * data[what].sel(law=law), color=color, linestyle=style, label=law)
-        axes.set_xlabel("mesh deflection in um")
-        axes.set_ylabel(label)
-        axes.grid(alpha=0.3)
-    panels[0].legend(fontsize="x-small")
     result = {str(law): float(data["force"].sel(law=law)[-1]) for law in data.law.values}
     text = ["Figure 7: the laws are plotted over the same axes; the paper prints no numbers for its curves."]
-    return Figures(pictures={"figure_7": png(figure)}, result={"figure_7_force_at_20_um_N": result}, text=text)
+    return Figures(
+        pictures={"figure_7": png(plot_elasticities(data, list(springs)))},
+        result={"figure_7_force_at_20_um_N": result},
+        text=text,
+    )
 
 
 def niemann() -> ProgressiveNiemann:
@@ -187,41 +177,18 @@ def figures_12_and_13() -> Figures:
     """Deformation, stiffness and friction torque over load, at +-10 rad/s on wheel A."""
     gear = rig()
     law, ratio = gear.meshes["mesh"].law(), gear.ratio()
-    bend, loss = (Figure(figsize=(9, 4.2), layout="constrained") for _ in range(2))
-    deformation, stiffness = bend.subplots(1, 2)
-    torque = loss.subplots()
     result: dict[str, Any] = {"no_load_friction_Nm": {}, "friction_at_12_Nm": {}}
-    for sign, color, style in ((1, COLORS[1], "-"), (-1, COLORS[2], "--")):
+    curves: dict[str, list[RigCurve]] = {}
+    for sign in (1, -1):
         points = [balance(gear, output_torque=t, output_speed=sign * RIG["speed"] / ratio) for t in LOADS]
         normal = np.array([point.normal["mesh"] for point in points])
         friction = np.array([point.input_torque + point.output_torque / ratio for point in points])
         deflection = np.array([_deflection(law, force) for force in normal])
         train = deflection + normal / RIG["train stiffness"]
-        slope = np.concatenate([np.gradient(normal[side], deflection[side]) for side in FLANKS])
         label = f"{sign * RIG['speed']:+g} rad/s"
-        for side in FLANKS:  # separately: between them is only the gap
-            x, words = normal[side], label if side == FLANKS[0] else ""
-            for axes, y, line, what in (
-                (deformation, 1e6 * deflection, style, ", mesh"),
-                (deformation, 1e6 * train, ":", ", with train"),
-                (stiffness, 1e-6 * slope, style, ""),
-            ):
-                axes.plot(x, y[side], color=color, linestyle=line, label=words and words + what)
-        torque.plot(normal, friction, color=color, label=label)
+        curves[label] = [RigCurve(normal[side], friction[side], deflection[side], train[side]) for side in FLANKS]
         result["friction_at_12_Nm"][label] = {f"{LOADS[k]:+g} N m on B": float(friction[k]) for k in (0, -1)}
         result["no_load_friction_Nm"][label] = float(friction[np.abs(LOADS).argmin()])
-    for axes, what in (
-        (deformation, "deformation in um"),
-        (stiffness, "stiffness in N/um"),
-        (torque, "T_A + T_B r_A/r_B in N m"),
-    ):
-        axes.set_xlabel("normal force in N")
-        axes.set_ylabel(what)
-        axes.grid(alpha=0.3)
-        axes.legend(fontsize="small")
-    for (speed, flank), quadrant in QUADRANTS.items():
-        place = (flank * 300, speed * 0.02)
-        torque.annotate(f"quadrant {quadrant}", place, ha="center", color="#8c8c8c", fontsize="small")
     text = [
         "Figures 12 and 13: the paper prints the errors of its simulation against its measurement (at most 10 um and "
         "0.09 N m, on average 3.4 um and 0.023 N m) but no values of the curves, so only the no-load friction can be "
@@ -230,7 +197,7 @@ def figures_12_and_13() -> Figures:
         "the paper (its text also says 0.5 N m, a misprint).",
         "The face width and the train stiffness are not printed; 10 mm and 20 N/um are assumed.",
     ]
-    pictures = {"figure_12": png(bend), "figure_13": png(loss)}
+    pictures = {"figure_12": png(plot_deformation(curves)), "figure_13": png(plot_friction(curves))}
     return Figures(pictures=pictures, result={"figures_12_13": result}, text=text)
 
 

@@ -9,9 +9,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from matplotlib.figure import Figure
-
 from actuator.actuator import Actuator
 from actuator.verdict.verdict import REST
 from studies.cache import fingerprint
@@ -19,6 +16,7 @@ from studies.cases import Case
 from studies.corners import AS_IS, Corner, select
 from studies.files import StudyError
 from studies.findings import Findings, render, versions
+from studies.robustness.pictures import plot_influences, plot_scatter
 from studies.robustness.robustness import CONFIDENCE, Probability, Robustness, robustness
 from studies.specification import Demand, Specification
 from studies.study import Work
@@ -27,7 +25,6 @@ from studies.tuning.plant import add_dead_band, defaults_of
 from studies.tuning.result import read_tuned_gains
 
 STEPS = (0.1, 1.0)  # of the demanded amplitude
-SHOWN = 12  # parameters in the picture
 HUNTS, SLOW = "hunting or undecided", "missing the bandwidth"
 CYCLE, FOLLOWED = "cycle", "followed"
 LABELS = {CYCLE: "the amplitude of the cycle", FOLLOWED: "load over reference"}
@@ -145,7 +142,10 @@ class RobustnessStudy:
             "versions": versions("SALib"),
         }
         return Findings(
-            pictures={"influences": _influences(found), "scatter": _scatter(found)},
+            pictures={
+                "influences": plot_influences(found, LABELS),
+                "scatter": plot_scatter(found, {"at rest": False, HUNTS: True}, hunts),
+            },
             result=result,
             text=text,
             files={"points.csv": _points_csv(found)},
@@ -171,46 +171,6 @@ def describe(each: Probability) -> str:
         f"{each.value:.3g} ({each.happened} of {each.trials}; {CONFIDENCE:.0%} confidence interval {each.low:.3g} to "
         f"{each.high:.3g})"
     )
-
-
-def _influences(found: Robustness) -> Figure:
-    """Total and first-order indices, a bar per parameter."""
-    figure = Figure(figsize=(9, 3.8), layout="constrained")
-    panels = figure.subplots(1, len(found.influences), squeeze=False)[0]
-    for axes, (measure, rows) in zip(panels, found.influences.items(), strict=True):
-        shown = rows[:SHOWN][::-1]
-        at = np.arange(len(shown))
-        axes.barh(at + 0.2, [row.total for row in shown], 0.4, xerr=[row.total_within for row in shown], label="total")
-        axes.barh(
-            at - 0.2, [row.alone for row in shown], 0.4, xerr=[row.alone_within for row in shown], label="first order"
-        )
-        axes.set_yticks(at, [row.parameter for row in shown], fontsize="small")
-        axes.set_xlabel(f"share of the variance of\n{LABELS[measure]}")
-        most = max(row.total + row.total_within for row in rows)
-        axes.set_xlim(0, max(1.25, 1.05 * most))
-        axes.grid(alpha=0.3, axis="x")
-        if not any(row.total for row in rows):
-            axes.text(0.5, 0.5, "does not vary", ha="center", transform=axes.transAxes)
-    panels[0].legend(fontsize="small", loc="lower right")
-    return figure
-
-
-def _scatter(found: Robustness) -> Figure:
-    """Every actuator over the two parameters with the largest indices, those that hunt marked."""
-    rows = max(found.influences.values(), key=lambda rows: rows[0].total)
-    names = [row.parameter for row in rows[:2]]
-    names = names if len(names) == 2 else names * 2  # noqa: PLR2004 - two axes
-    figure = Figure(figsize=(6, 4.2), layout="constrained")
-    axes = figure.subplots()
-    for label, marks, style in (("at rest", False, "o"), (HUNTS, True, "x")):
-        chosen = [p for p, result in zip(found.points, found.results, strict=True) if hunts(result) == marks]
-        if chosen:
-            axes.plot([p[names[0]] for p in chosen], [p[names[1]] for p in chosen], style, ms=5, label=label)
-    axes.set_xlabel(f"factor on {names[0]}")
-    axes.set_ylabel(f"factor on {names[1]}")
-    axes.legend(fontsize="small")
-    axes.grid(alpha=0.3)
-    return figure
 
 
 def _points_csv(found: Robustness) -> str:

@@ -31,6 +31,8 @@ class ModeModel:
     ----------
     name : str
         "stuck", "forward", "backward" (of the output), with the contacts that differ.
+    direction : str
+        Of the output: "stuck", "forward" or "backward".
     point : OperatingPoint
         State and modes; `linearize`, `loop_transfer` and `poles` take it.
     equilibrium : bool
@@ -38,6 +40,7 @@ class ModeModel:
     """
 
     name: str
+    direction: str
     point: OperatingPoint = field(repr=False)
     equilibrium: bool
 
@@ -86,6 +89,11 @@ class ModeModels:
         require_known([name], [model.name for model in self.models], "reachable mode")
         return next(model for model in self.models if model.name == name)
 
+    @property
+    def directions(self) -> dict[str, str]:
+        """Direction of the output by mode."""
+        return {model.name: model.direction for model in self.models}
+
     def loops(self, at: str) -> dict[str, control.StateSpace]:
         """Loop transfer in each mode, opened at a named signal."""
         return {model.name: model.loop(at) for model in self.models}
@@ -102,7 +110,7 @@ class ModeModels:
         """Bode plot of the loop opened at a named signal, a line per mode in front of the envelope."""
         from actuator.plots.bode import plot_modes
 
-        return plot_modes(self.loops(at), f"loop opened at {at.replace('_', ' ')}")
+        return plot_modes(self.loops(at), f"loop opened at {at.replace('_', ' ')}", directions=self.directions)
 
 
 def linearize_modes(
@@ -142,25 +150,25 @@ def linearize_modes(
     found: list[ModeModel] = []
     reasons: dict[str, NoEquilibrium] = {}
 
-    def attempt(name: str, contacts: str | dict[str, str], start: Mapping[str, float] | None) -> None:
+    def attempt(name: str, direction: str, contacts: str | dict[str, str], start: Mapping[str, float] | None) -> None:
         try:
             point = trim(system, contacts, inputs=inputs, guess=start, parameters=parameters)
         except NoEquilibrium as error:
             reasons[name] = error
         else:
-            found.append(ModeModel(name=name, point=point, equilibrium=True))
+            found.append(ModeModel(name=name, direction=direction, point=point, equilibrium=True))
 
     contacts = [contact.name for contact in system.contacts]
     for word in MOTIONS if contacts else [FORWARD]:
-        attempt(word, word, guess)
+        attempt(word, word, word, guess)
     if not found:
         raise next(iter(reasons.values()))
     sliding = [model for model in found if model.name != STUCK]
     for model in sliding if partial else []:
         for stuck in _mixed(contacts):
             words = {name: STUCK if name in stuck else model.contacts[name] for name in contacts}
-            attempt(f"{model.name}, stuck {_short(stuck)}", words, model.point.states)
-    flights = [_in_gap(model, name) for model in sliding for name in _gapped(system)]
+            attempt(f"{model.name}, stuck {_short(stuck)}", model.direction, words, model.point.states)
+    flights = [_in_gap(model, name) for model in sliding for name in _find_gaps(system)]
     return ModeModels(models=(*found, *flights), unreachable={name: str(reason) for name, reason in reasons.items()})
 
 
@@ -171,10 +179,10 @@ def _mixed(contacts: Sequence[str]) -> Iterator[tuple[str, ...]]:
 
 
 def _short(contacts: Sequence[str]) -> str:
-    return " ".join(name.removeprefix("gear.") for name in contacts)
+    return " ".join(name.replace("gear.", "") for name in contacts)
 
 
-def _gapped(system: HybridSystem) -> list[str]:
+def _find_gaps(system: HybridSystem) -> list[str]:
     """Meshes and couplings with a gap, by path; not the end stops, which are mostly not touched."""
     return [name for name, place in gaps(system).items() if place is not Place.STOP]
 
@@ -185,4 +193,5 @@ def _in_gap(model: ModeModel, name: str) -> ModeModel:
     inside = np.array([mode.at == name for mode in system.mode_variables])
     m = np.where(inside, 0.0, point.m)
     flight = OperatingPoint(system=system, x=point.x, m=m, u=point.u, p=point.p, rates=point.rates)
-    return ModeModel(name=f"{model.name}, {FREE} {_short([name])}", point=flight, equilibrium=False)
+    label = f"{model.name}, {FREE} {_short([name])}"
+    return ModeModel(name=label, direction=model.direction, point=flight, equilibrium=False)

@@ -87,11 +87,16 @@ def finish_frequency(axes: Axes) -> None:
 # -- models per contact mode --------------------------------------------------------------------------------
 
 
-def plot_modes(models: Mapping[str, control.StateSpace], title: str, unit: str = "") -> Figure:
-    """Gain and phase of every mode in which anything passes, in front of the envelope of all."""
+def plot_modes(
+    models: Mapping[str, control.StateSpace], title: str, unit: str = "", directions: Mapping[str, str] | None = None
+) -> Figure:
+    """Gain and phase of every mode in which anything passes, in front of the envelope of all.
+
+    `directions` of the output by mode choose the dashes.
+    """
     figure = Figure(figsize=(9, 6), layout="constrained")
     gain, phase = bode_panels(figure)[:, 0]
-    draw_modes(gain, phase, models)
+    draw_modes(gain, phase, models, directions=directions or {})
     finish_bode(gain, phase, unit)
     legend_below(figure, gain, 3)
     gain.set_title(title, fontsize="medium")
@@ -104,9 +109,9 @@ def draw_modes(
     models: Mapping[str, control.StateSpace],
     frequencies: np.ndarray = FREQUENCIES,
     *,
-    lines: bool = True,
+    directions: Mapping[str, str] | None = None,
 ) -> None:
-    """The envelope of all modes over frequency [rad/s], and a line per mode."""
+    """The envelope of all modes over frequency [rad/s]; with their directions a line per mode, too."""
     step = max(float(model.dt or 0) for model in models.values())
     frequencies = frequencies[frequencies * step < np.pi]
     passing = {name: model for name, model in models.items() if passes(model)}
@@ -116,9 +121,9 @@ def draw_modes(
         draw_envelope(gain, hertz, to_db(band.gain_low), to_db(band.gain_high))
         draw_envelope(phase, hertz, DEGREES * band.phase_low, DEGREES * band.phase_high)
     name_cut(gain, [name for name in models if name not in passing])
-    for k, (name, model) in enumerate(passing.items() if lines else ()):
+    for k, (name, model) in enumerate(passing.items() if directions is not None else ()):
         size, angle = bode_of(model, frequencies)
-        style = mode_style(name, k)
+        style = mode_style(name, k, directions or {})
         gain.plot(hertz, to_db(size), linewidth=1.2, label=name, **style)
         phase.plot(hertz, DEGREES * angle, linewidth=1.2, **style)
 
@@ -133,12 +138,12 @@ def name_cut(axes: Axes, modes: Sequence[str]) -> None:
     """An entry of the legend for modes that have no line."""
     if modes:
         which = ", ".join(modes) if len(modes) <= MOST_NAMES else f"{len(modes)} modes"
-        axes.plot([], [], " ", label=f"{CUT}: {which}")
+        axes.plot([], [], " ", label=f"{CUT}: {which}", gid=CUT)
 
 
-def mode_style(mode: str, k: int) -> dict[str, Any]:
+def mode_style(mode: str, k: int, directions: Mapping[str, str]) -> dict[str, Any]:
     """Color and line of a contact mode, the k-th in a picture."""
-    dashed = mode.partition(",")[0] == BACKWARD
+    dashed = directions.get(mode, mode) == BACKWARD
     return {"color": MODE_COLORS.get(mode, f"C{(k + 2) % 10}"), "linestyle": DASHED if dashed else "-"}
 
 
@@ -147,7 +152,7 @@ def plot_loops(loops: Mapping[str, control.StateSpace], title: str) -> Figure:
     figure = Figure(figsize=(9, 5.6), layout="constrained")
     gain, phase = bode_panels(figure)[:, 0]
     for k, (mode, loop) in enumerate(loops.items()):
-        style = mode_style(mode, k)
+        style = mode_style(mode, k, {})
         if not passes(loop):
             gain.plot([], [], color=style["color"], label=f"{mode}: {CUT}")
             continue

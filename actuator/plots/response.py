@@ -70,7 +70,7 @@ def draw_responses(
     hertz = data.frequency.values
     if linear:
         span = 2 * np.pi * np.logspace(np.log10(hertz.min()), np.log10(hertz.max()), 400)
-        draw_modes(gain, phase, linear, span, lines=False)
+        draw_modes(gain, phase, linear, span)
     top, bottom = -np.inf, np.inf
     for amplitude, label, color in _amplitudes(data):
         at = {"amplitude": amplitude, **where}
@@ -79,7 +79,7 @@ def draw_responses(
         known = np.isfinite(response)
         moves &= known
         if not moves.any():
-            gain.plot([], [], color=color, label=label + (STILL if known.any() else FAILED))
+            gain.plot([], [], color=color, label=label + (STILL if known.any() else FAILED), gid=label)
             continue
         draw_bode(gain, phase, hertz, response, known=moves, settled=settled, color=color, label=label)
         size = to_db(abs(response[moves]))

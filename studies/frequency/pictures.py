@@ -10,7 +10,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from actuator import Spectrum
+from actuator import ModeModels, Spectrum
 from actuator.linear.bode import to_db
 from actuator.linear.margins.sensitivity import Peak, Sensitivities
 from actuator.plots.bode import (
@@ -26,7 +26,6 @@ from actuator.plots.bode import (
 )
 from actuator.plots.response import FAILED, READING, STILL, draw_responses
 from actuator.plots.style import legend_below, shown_as
-from actuator.system.contact_modes import FREE
 from studies.frequency.mask import Mask
 from studies.frequency.plan import Place
 from studies.frequency.study import CaseResponse
@@ -89,9 +88,9 @@ def _legend(figure: Figure, panels: Iterable[Axes]) -> None:
     handles: dict[str, Artist] = {}
     for axes in panels:
         handles |= {label: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
-    for label in list(handles):
-        moves_elsewhere = label.endswith((STILL, FAILED)) and label.rpartition(":")[0] in handles
-        if moves_elsewhere or label.startswith(CUT):
+    for label, handle in list(handles.items()):
+        # what has no line here has one elsewhere, or is no amplitude
+        if handle.get_gid() == CUT or handle.get_gid() in handles:
             del handles[label]
     figure.legend(
         handles.values(), handles.keys(), loc="outside lower center", ncols=4, fontsize="small", frameon=False
@@ -126,7 +125,7 @@ def plot_beside(studies: Sequence[CaseResponse], amplitudes: Sequence[float]) ->
     return figure
 
 
-def plot_sensitivities(found: Mapping[str, Sensitivities | None], title: str) -> Figure:
+def plot_sensitivities(found: Mapping[str, Sensitivities | None], title: str, directions: Mapping[str, str]) -> Figure:
     """|S| and |T| of every mode in which anything passes, in front of the envelope of all, the largest marked."""
     figure = Figure(figsize=(9, 6), layout="constrained")
     panels = figure.subplots(2, 1, sharex=True)
@@ -140,7 +139,7 @@ def plot_sensitivities(found: Mapping[str, Sensitivities | None], title: str) ->
         sizes = to_db(np.array(list(curves.values())))
         draw_envelope(axes, hertz, sizes.min(axis=0), sizes.max(axis=0))
         for k, (mode, curve) in enumerate(curves.items()):
-            axes.plot(hertz, to_db(curve), linewidth=1.2, label=mode, **mode_style(mode, k))
+            axes.plot(hertz, to_db(curve), linewidth=1.2, label=mode, **mode_style(mode, k, directions))
         peaks = {mode: (each.sensitivity_peak, each.complementary_peak)[index] for mode, each in passing.items()}
         _mark(axes, peaks, ("$M_S$ = {:.3g}", "$M_T$ = {:.3g}")[index])
         axes.set_ylabel(name)
@@ -153,12 +152,15 @@ def plot_sensitivities(found: Mapping[str, Sensitivities | None], title: str) ->
     return figure
 
 
-def plot_compliance(models: Mapping[str, control.StateSpace], peaks: Mapping[str, Peak]) -> Figure:
+def plot_compliance(
+    models: ModeModels, compliance: Mapping[str, control.StateSpace], peaks: Mapping[str, Peak]
+) -> Figure:
     """Load angle over load torque in every mode; the largest is marked, of what is in contact and of what flies."""
-    figure = plot_modes(models, "load angle over load torque, all loops closed", "rad/(N m)")
+    title = "load angle over load torque, all loops closed"
+    figure = plot_modes(compliance, title, "rad/(N m)", models.directions)
     gain = figure.axes[0]
-    for flies in (False, True):
-        chosen = {mode: each for mode, each in peaks.items() if (f", {FREE} " in mode) == flies}
+    for equilibrium in (True, False):
+        chosen = {model.name: peaks[model.name] for model in models if model.equilibrium == equilibrium}
         if any(each.value > 0 for each in chosen.values()):
             _mark(gain, chosen, "{:.3g} rad/(N m)")
     gain.set_ylim(top=gain.get_ylim()[1] + 10)

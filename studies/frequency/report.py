@@ -80,14 +80,17 @@ def _pictures(plan: Plan, study: CaseResponse, measured: Sequence[Spectrum]) -> 
     if len(places) > 1:
         for k in range(0, len(places), ABREAST):
             found[f"places_{k // ABREAST + 1}"] = plot_places(study, places[k : k + ABREAST], plan.mask, plan.stroke)
-    found["closed"] = plot_modes(linear.closed, "load angle over reference, all loops closed")
-    found["compliance"] = plot_compliance(linear.compliance, linear.compliance_peaks)
+    directions = linear.models.directions
+    found["closed"] = plot_modes(linear.closed, "load angle over reference, all loops closed", directions=directions)
+    found["compliance"] = plot_compliance(linear.models, linear.compliance, linear.compliance_peaks)
     for at, loops in linear.loops.items():
         words = at.replace("_", " ")
         if all(loop.ninputs == 1 for loop in loops.values()):
-            found[f"loop_{at}"] = plot_modes(loops, f"loop opened at {words}")
+            found[f"loop_{at}"] = plot_modes(loops, f"loop opened at {words}", directions=directions)
         if any(linear.sensitivities[at].values()):
-            found[f"sensitivity_{at}"] = plot_sensitivities(linear.sensitivities[at], f"loop opened at {words}")
+            found[f"sensitivity_{at}"] = plot_sensitivities(
+                linear.sensitivities[at], f"loop opened at {words}", directions
+            )
     return found | {f"stiffness_{word}": stiffness.plot() for word, stiffness in study.stiffness.items()}
 
 

@@ -143,3 +143,63 @@ def test_pictures_are_entered_only_when_they_are_drawn(file):
     if PICTURES not in file.parts:
         names = run_time_imports(parsed(file), late=False)
         assert [name for name in names if name.startswith(f"actuator.{PICTURES}")] == []
+
+
+# -- no meaning is read off a name --------------------------------------------------------------------------
+
+TAKING_APART = {"endswith", "startswith", "removesuffix", "removeprefix", "partition", "rpartition", "split", "rsplit"}
+NOT_NAMES = {".toml", ",", "=", ":", "*", "+", "+-", ";", "\n", "\n\n", " ", "_", "__", ".py", "/"}  # files and options
+NO_TEXTS = ("np", "shlex", "ca", "log", "self", "pieces.log")  # arrays, and what packs modes into numbers
+ALLOWED = {
+    "gear/quantities/registry.py",  # modules of Python
+    "studies/converter.py",  # keys of files and their units
+    "studies/units.py",
+    "studies/files.py",
+    "studies/structure.py",
+}
+
+
+def texts_of(node, constants):
+    """Texts that an argument can be, followed through constants of the module; None for what is not known."""
+    if isinstance(node, ast.Name):
+        node = constants.get(node.id)
+    if isinstance(node, ast.Tuple):
+        return {text for part in node.elts for text in texts_of(part, constants)}
+    return {node.value} if isinstance(node, ast.Constant) else {None}
+
+
+def names_read(tree):
+    """Calls that take a text apart at something that is no sign of a file or an option."""
+    constants = {
+        target.id: node.value
+        for node in tree.body
+        if isinstance(node, ast.Assign)
+        for target in node.targets
+        if isinstance(target, ast.Name)
+    }
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in TAKING_APART:
+            owner = ast.unparse(node.func.value)
+            texts = set().union(*(texts_of(argument, constants) for argument in node.args), set())
+            if owner not in NO_TEXTS and not texts <= NOT_NAMES:
+                yield f"line {node.lineno}: {ast.unparse(node)}"
+
+
+@pytest.mark.parametrize("file", [file for file in FILES if str(file) not in ALLOWED], ids=str)
+def test_no_meaning_is_read_off_a_name(file):
+    assert list(names_read(parsed(file))) == []
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        'name.endswith(".static")',
+        'ENDS = (".gap", ".static")\nname.endswith(ENDS)',
+        'name.removeprefix("gear.")',
+        'name.rpartition(".")',
+        "name.startswith(prefix)",
+    ],
+)
+def test_a_name_that_is_taken_apart_is_seen(source):
+    assert len(list(names_read(ast.parse(source)))) == 1
+    assert list(names_read(ast.parse('file.endswith(".toml"); text.split(","); np.split(x, ends)'))) == []

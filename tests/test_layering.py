@@ -152,6 +152,10 @@ NOT_NAMES = {".toml", ",", "=", ":", "*", "+", "+-", ";", "\n", "\n\n", " ", "_"
 NO_TEXTS = ("np", "shlex", "ca", "log", "self", "pieces.log")  # arrays, and what packs modes into numbers
 ALLOWED = {
     "gear/quantities/registry.py",  # modules of Python
+    "studies/study.py",
+    "studies/cache.py",  # the head of a file
+    "studies/frequency/plan.py",  # result.json among paths
+    "controllers/countermeasures.py",  # a path of fields
     "studies/converter.py",  # keys of files and their units
     "studies/units.py",
     "studies/files.py",
@@ -163,6 +167,8 @@ def texts_of(node, constants):
     """Texts that an argument can be, followed through constants of the module; None for what is not known."""
     if isinstance(node, ast.Name):
         node = constants.get(node.id)
+    if isinstance(node, ast.IfExp):
+        return texts_of(node.body, constants) | texts_of(node.orelse, constants)
     if isinstance(node, ast.Tuple):
         return {text for part in node.elts for text in texts_of(part, constants)}
     return {node.value} if isinstance(node, ast.Constant) else {None}

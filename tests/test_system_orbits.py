@@ -38,8 +38,9 @@ def orbit_of(plant, segments=1):
 
 
 def return_map(orbit, step):
-    """Eigenvalues of the slopes, by cubics through 32 points, of the state after the cycle's last event by the state after its first.
+    """Eigenvalues of the slopes of the state after the cycle's last event by the state after its first.
 
+    The slopes are those of cubics through 32 points.
     The state is moved only in directions that its stuck contacts allow, which are those in which it returns.
     """
     scale, m = orbit.map.nominal, orbit.map

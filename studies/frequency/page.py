@@ -14,6 +14,7 @@ from actuator.system.hybrid import Place as ContactPlace
 from studies.findings import render
 from studies.frequency.bench import TESTS
 from studies.frequency.mask import SIDES, LimitCheck
+from studies.frequency.pictures import abreast
 from studies.frequency.plan import PARTS, Place, Plan
 from studies.frequency.study import CaseResponse
 
@@ -27,21 +28,20 @@ def html(  # noqa: PLR0913, PLR0917 - all there is to show
     measured: Sequence[Spectrum],
     result: dict[str, Any],
     text: list[str],
-    pictures: tuple[Mapping[str, str], Mapping[str, str]],
+    pictures: tuple[Mapping[str, str], Mapping[str, Mapping[str, str]]],
 ) -> str:
-    """Render the page; `pictures` are all pictures in base64 by name, and the prefixes of their names by case."""
-    found, prefixes = pictures
+    """Render the page; `pictures` are all pictures in base64 by file, and the file of each by case and name."""
+    found, files = pictures
     shown = []
     for study in studies:
-        prefix = prefixes[study.case.name]
-        own = {name.removeprefix(prefix): image for name, image in found.items() if name.startswith(prefix)}
+        own = {name: found[file] for name, file in files[study.case.name].items()}
         shown.append(_shown(plan, study, own, measured))
     return render(
         "frequency_response.html",
         shown=shown,
         beside=found.get("beside", ""),
         several=any(len(study.checks) > 1 for study in studies),
-        places=sorted({name for each in shown for name in each["pictures"] if name.startswith("places_")}),
+        places=sorted({name for study in studies for name in abreast(study.checks)}),
         mask=plan.mask,
         limits=[_limit(plan, k) for k in range(len(plan.mask.limits))],
         loops=list(dict.fromkeys(at for study in studies for at in study.linear.loops)),

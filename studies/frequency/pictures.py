@@ -36,6 +36,7 @@ STYLES = ("-", "--", "-.", ":")  # of limits, or of amplitudes
 LEAST_DB, LEAST_SENSITIVITY_DB = -40.0, -60.0  # that are shown of places side by side, and of a sensitivity
 LEFT = 10.0  # Hz, up to which the words about a peak stand to its right
 MOST_AMPLITUDES = len(STYLES)  # in a comparison
+ABREAST = 3  # places in a picture
 
 
 def plot_family(study: CaseResponse, mask: Mask, stroke: float, measured: Sequence[Spectrum] = ()) -> Figure:
@@ -47,6 +48,13 @@ def plot_family(study: CaseResponse, mask: Mask, stroke: float, measured: Sequen
         legend.remove()
     _legend(figure, (gain, phase))
     return figure
+
+
+def abreast(places: Iterable[Place]) -> dict[str, list[Place]]:
+    """Places that are drawn side by side, by the name of their picture; none where there is a single place."""
+    every = list(places)
+    rows = [every[k : k + ABREAST] for k in range(0, len(every), ABREAST)] if len(every) > 1 else []
+    return {f"places_{k}": row for k, row in enumerate(rows, start=1)}
 
 
 def plot_places(study: CaseResponse, places: Sequence[Place], mask: Mask, stroke: float) -> Figure:

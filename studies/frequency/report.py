@@ -16,15 +16,20 @@ from studies.cache import program_fingerprint
 from studies.findings import Findings, versions
 from studies.frequency.mask import SIDES, LimitCheck
 from studies.frequency.page import html
-from studies.frequency.pictures import plot_beside, plot_compliance, plot_family, plot_places, plot_sensitivities
+from studies.frequency.pictures import (
+    abreast,
+    plot_beside,
+    plot_compliance,
+    plot_family,
+    plot_places,
+    plot_sensitivities,
+)
 from studies.frequency.plan import PARTS, Plan
 from studies.frequency.study import CaseResponse
 from studies.frequency.tables import margin_rows, response_rows, stiffness_rows, write_netcdf, write_rows
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-ABREAST = 3  # places in a picture
 
 
 def study_findings(plan: Plan, studies: Sequence[CaseResponse], measured: Sequence[Spectrum] = ()) -> Findings:
@@ -35,15 +40,16 @@ def study_findings(plan: Plan, studies: Sequence[CaseResponse], measured: Sequen
         return f"{label}_{name}" if several else name
 
     pictures: dict[str, Figure | bytes] = {}
+    files_of: dict[str, dict[str, str]] = {}  # file of each picture of a case
     for study in studies:
-        label = study.case.name
-        pictures |= {named(label, name): figure for name, figure in _pictures(plan, study, measured).items()}
+        own: dict[str, Figure | bytes] = {**_pictures(plan, study, measured)}
         tests = {name: test["picture"] for name, test in study.tests.items() if test["picture"]}
-        pictures |= {named(label, file_name(name)): base64.b64decode(image) for name, image in tests.items()}
+        own |= {file_name(name): base64.b64decode(image) for name, image in tests.items()}
+        files_of[study.case.name] = {name: named(study.case.name, name) for name in own}
+        pictures |= {files_of[study.case.name][name]: picture for name, picture in own.items()}
     if several:
         pictures["beside"] = plot_beside(studies, _compared(plan))
     text, result = sentences(plan, studies), result_of(plan, studies)
-    prefixes = {study.case.name: named(study.case.name, "") for study in studies}
     files: dict[str, str | Callable[[Path], None]] = {
         "responses.csv": lambda path: write_rows(path, response_rows(plan, studies)),
         "stiffness.csv": lambda path: write_rows(path, stiffness_rows(studies)),
@@ -59,7 +65,7 @@ def study_findings(plan: Plan, studies: Sequence[CaseResponse], measured: Sequen
         result=result,
         text=text,
         files=files,
-        page=lambda found: html(plan, studies, measured, result, text, (found, prefixes)),
+        page=lambda found: html(plan, studies, measured, result, text, (found, files_of)),
     )
 
 
@@ -75,11 +81,9 @@ def _compared(plan: Plan) -> list[float]:
 
 def _pictures(plan: Plan, study: CaseResponse, measured: Sequence[Spectrum]) -> "dict[str, Figure]":
     linear = study.linear
-    places = list(study.checks)
     found = {"family": plot_family(study, plan.mask, plan.stroke, measured), "harmonics": study.family.plot_harmonics()}
-    if len(places) > 1:
-        for k in range(0, len(places), ABREAST):
-            found[f"places_{k // ABREAST + 1}"] = plot_places(study, places[k : k + ABREAST], plan.mask, plan.stroke)
+    for name, some in abreast(study.checks).items():
+        found[name] = plot_places(study, some, plan.mask, plan.stroke)
     directions = linear.models.directions
     found["closed"] = plot_modes(linear.closed, "load angle over reference, all loops closed", directions=directions)
     found["compliance"] = plot_compliance(linear.models, linear.compliance, linear.compliance_peaks)

@@ -40,6 +40,8 @@ from controllers import PI, PID, Cascade, P
 from gear import Bearing, Coupling, Shaft, Transmission
 from studies import load_case
 
+pytestmark = pytest.mark.thorough
+
 INERTIA, FREQUENCY, DAMPING = 0.2, 20.0, 0.5
 PROPORTIONAL, DERIVATIVE = INERTIA * FREQUENCY**2, 2 * DAMPING * FREQUENCY * INERTIA
 STROKE = 1.0

@@ -19,6 +19,8 @@ from actuator import HybridSystem, continue_orbit, find_orbit, simulate
 from actuator.system.hybrid import MARGIN_BAND, Contact, Event, Mode, Place, Quantity
 from actuator.system.parameters import Parameter
 
+pytestmark = pytest.mark.thorough
+
 
 @cache
 def twisted():

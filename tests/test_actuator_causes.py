@@ -21,6 +21,8 @@ from actuator.diagnosis.cycle_energy import energy_per_cycle
 from actuator.verdict.verdict import decide
 from studies import load_case
 
+pytestmark = pytest.mark.thorough
+
 INPUTS = {"reference": 1.0}
 
 

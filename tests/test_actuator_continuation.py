@@ -22,6 +22,8 @@ from actuator import (
 from controllers import PID
 from gear import Backlash, Bearing, ExternalPair, Linear, Mesh, Shaft, Transmission
 
+pytestmark = pytest.mark.thorough
+
 # compiled where there is a compiler: a family is many orbits
 BREAKAWAY, DEAD = "gear.bearings.guide.breakaway", "controller.remedies.dead_band"
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from annotated_types import Unit
 
-from actuator import PMSM, DCMotor, Load, simulate, unpowered
+from actuator import PMSM, DCMotor, Load, remove_drive, simulate
 from actuator.contracts import (
     check_contributions,
     check_demanded_current,
@@ -313,4 +313,4 @@ def test_a_new_motor_is_one_class_that_registers(monkeypatch, tmp_path):
     run = simulate(case.actuator, 4.0, inputs=case.inputs, compiled=False)
     assert run["load_angle"][-1] == pytest.approx(0.002, abs=1e-4)
     with pytest.raises(ValueError, match="cogging and drag"):
-        unpowered(case.actuator)
+        remove_drive(case.actuator)

@@ -11,6 +11,8 @@ from actuator.describing.check import check_describing_function
 from actuator.describing.describing import backlash, coulomb_friction, harmonics_of, predict_cycles, stage_response
 from gear import Bearing, Shaft, Transmission
 
+pytestmark = pytest.mark.thorough
+
 
 def guide(coulomb=0.0, breakaway=0.0, viscous=2.0):
     bearing = Bearing(shaft="mass", coulomb=coulomb, breakaway=breakaway, viscous=viscous)

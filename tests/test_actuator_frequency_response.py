@@ -40,6 +40,8 @@ from actuator.simulation.fourier import fourier_coefficients
 from controllers import PID, Sampling
 from gear import Bearing, KnownOil, OilAt, Shaft, Thickening, Transmission
 
+pytestmark = pytest.mark.thorough
+
 INERTIA, COULOMB, BREAKAWAY = 0.2, 1.0, 1.5
 PROPORTIONAL, INTEGRAL, DERIVATIVE = 30.0, 40.0, 6.0
 

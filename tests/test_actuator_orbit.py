@@ -17,6 +17,8 @@ from actuator.orbits.sampled import SampledOrbit
 from actuator.orbits.segments import passage
 from controllers import Sampling
 
+pytestmark = pytest.mark.thorough
+
 GUIDE = "gear.bearings.guide"
 CASES = {
     "viscous": MassOnGuide(viscous=5.0),

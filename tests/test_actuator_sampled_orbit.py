@@ -16,6 +16,8 @@ from actuator.orbits.flow import NoOrbit
 from controllers import PID, Sampling
 from gear import Bearing, Shaft, Transmission
 
+pytestmark = pytest.mark.thorough
+
 KP, KI, KD, COULOMB, BREAKAWAY = 3.0, 4.0, 6.0, 1.0, 1.5
 CONTINUOUS = 23.369272293088, 0.06724014692, 0.780186658  # period s, amplitude rad, stick fraction
 

@@ -21,6 +21,8 @@ from studies.__main__ import COMMANDS, main
 from studies.findings import Findings
 from studies.study import load_commands
 
+pytestmark = pytest.mark.thorough
+
 MASS = """
 title = "Mass on a guide"
 description = "It hunts."

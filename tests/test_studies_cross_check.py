@@ -17,6 +17,8 @@ from studies.checks import cross_check_drive as motulator
 from studies.checks import cross_check_record as record
 from studies.checks.deviation import Deviation, table
 
+pytestmark = pytest.mark.thorough
+
 ROWS = {"rod against": 1, "rod with noise": 1, "machine": 4, "drive": 4}
 
 

@@ -24,6 +24,8 @@ from studies.frequency.page import list_assumptions
 from studies.frequency.plan import PARTS, load_positioner
 from studies.frequency.tables import write_netcdf
 
+pytestmark = pytest.mark.thorough
+
 INERTIA, GAIN, RATE, INTEGRAL = 1.0, 100.0, 8.0, 50.0
 FREQUENCIES = (0.5, 1.0, 2.0)  # Hz
 STROKE, AMPLITUDE = 40.0, 0.01  # deg, of it

@@ -12,6 +12,8 @@ from click.testing import CliRunner
 from studies.__main__ import main
 from studies.checks.gear_paper import cold_gearbox, figure_7, figure_9_with_din, figures_12_and_13
 
+pytestmark = pytest.mark.thorough
+
 
 def test_a_cold_gearbox_has_the_published_efficiency_and_breakout():
     result = cold_gearbox().result["cold_gearbox"]

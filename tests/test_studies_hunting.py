@@ -21,6 +21,8 @@ from studies.hunting.ends import add_boundary, find_axis, find_crossings, find_e
 from studies.hunting.map import LABELS, Axis, Plan, compute, dataset
 from studies.hunting.study import make_plan
 
+pytestmark = pytest.mark.thorough
+
 BREAKAWAY, GAIN = "gear.bearings.guide.breakaway", "controller.integral"
 MASS = """
 title = "Mass on a guide"

@@ -24,6 +24,8 @@ from studies.files import StudyError
 from studies.robustness.robustness import MissingLibrary, factors, robustness, spread, wilson
 from studies.specification import Tolerance
 
+pytestmark = pytest.mark.thorough
+
 pytest.importorskip("SALib")
 
 

@@ -51,6 +51,8 @@ from studies.tuning.stiction import (
 )
 from studies.tuning.study import find_twins, tune
 
+pytestmark = pytest.mark.thorough
+
 DEAD_BAND = "controller.speed.remedies.dead_band"
 LOOPS = ("speed_reference", "torque_reference")
 PID_PATH = "controller."

@@ -24,9 +24,12 @@ from studies.tuning.check import check_corners
 from studies.tuning.loops import curves_at, gain_margin, phase_and_delay_margin
 from studies.tuning.measures import measures
 from studies.tuning.modes import corner_modes
-from studies.tuning.plant import INTEGRAL, POSITION, SPEED, NotTunable, prepare_linear
+from studies.tuning.plant import NotTunable, prepare_linear
 from studies.tuning.study import tune
 
+pytestmark = pytest.mark.thorough
+
+POSITION, SPEED, INTEGRAL = (f"controller.{name}" for name in ("position.gain", "speed.proportional", "speed.integral"))
 GAINS = {POSITION: 20.0, SPEED: 0.8, INTEGRAL: 8.0}
 INPUTS = ("reference", "load_torque", "inject.speed_reference", "inject.torque_reference")
 OUTPUTS = ("load_angle", "current", "speed_reference", "torque_reference")

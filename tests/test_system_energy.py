@@ -36,6 +36,8 @@ from actuator.system.hybrid import Quantity
 from controllers import Cascade, Sampling
 from gear import Backlash, Bearing, Coulomb, Coupling, ExternalPair, Linear, Mesh, Shaft, Transmission
 
+pytestmark = pytest.mark.thorough
+
 LOSSES = ("copper", "iron", "drag", "inverter", "friction", "damping")
 POWERS = ("electrical_power", "load_power", "source_power", *(f"{name}_loss" for name in (*LOSSES, "link", "chopper")))
 STORED = ("magnetic_energy", "mechanical_energy")

@@ -32,6 +32,8 @@ from controllers import PID
 from gear import Bearing, Coupling, Shaft, Transmission
 from studies import load_case
 
+pytestmark = pytest.mark.thorough
+
 # -- two masses on a spring ---------------------------------------------------------------------------------
 
 MOTOR, LOAD, SPRING = 2e-3, 5e-2, 800.0  # kg m^2, kg m^2, N m/rad

@@ -47,6 +47,8 @@ from gear import (
 from gear.quantities.roles import Breakaway, FrictionMemory
 from studies.converter import converter
 
+pytestmark = pytest.mark.thorough
+
 # Canudas de Wit, Olsson, Astrom, Lischinsky (1995), table I, for a unit mass
 S0, S1, S2, COULOMB, STATIC, STRIBECK = 1e5, math.sqrt(1e5), 0.4, 1.0, 1.5, 1e-3
 BRISTLES = LuGreBearing(

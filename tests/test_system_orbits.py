@@ -14,6 +14,8 @@ from actuator import classify, find_equilibrium_set, find_orbit, predict_breakaw
 from actuator.orbits.segments import passage
 from studies import load_case
 
+pytestmark = pytest.mark.thorough
+
 DURATION = 20.0  # s
 
 

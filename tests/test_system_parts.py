@@ -13,6 +13,8 @@ from random_parts import draw
 
 from actuator import NoEquilibrium, linearize, simulate, trim
 
+pytestmark = pytest.mark.thorough
+
 COMPOSITIONS, MORE = 40, 400
 SHORT, LONG = 0.02, 0.2  # s
 # a mesh that rests in its gap; compensation at standstill, twice; a load in its dead band; a motor at its limit

@@ -16,6 +16,8 @@ from actuator.system.hybrid import MARGIN_BAND
 from gear.mesh import MESH_SPEED_NOMINAL
 from gear.transmission import BEARING_SPEED_NOMINAL
 
+pytestmark = pytest.mark.thorough
+
 ACTUATORS = 200
 SHORT, FULL = 0.3, 2.0  # s simulated in every test run, and where asked for with `-m slow`
 ROUNDING = 1e-9  # of a margin; for a sliding contact that is a part of its usual speed

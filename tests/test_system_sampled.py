@@ -18,6 +18,8 @@ from controllers import PID, Sampling
 from gear import Bearing, Shaft, Transmission
 from studies import load_case
 
+pytestmark = pytest.mark.thorough
+
 BANDWIDTH, INERTIA = 20.0, 0.3
 
 

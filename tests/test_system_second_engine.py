@@ -21,6 +21,8 @@ from controllers import PID
 from gear import Bearing, Shaft, Transmission
 from studies.checks.paper import figure_9, figure_9_inputs, figure_9_start
 
+pytestmark = pytest.mark.thorough
+
 
 class Second(NamedTuple):
     """What the second engine found."""

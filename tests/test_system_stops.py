@@ -16,6 +16,8 @@ from actuator import Actuator, Load, Sine, Step, TorqueSource, linearize, simula
 from controllers import PID
 from gear import Bearing, Coupling, EndStop, ExternalPair, GivenPair, Mesh, Shaft, Transmission, add_brake
 
+pytestmark = pytest.mark.thorough
+
 INERTIA, STIFFNESS, SPEED = 2.0, 1e4, 1.0
 LOWER, UPPER = -0.3, 0.5
 MARGIN = -1e-9  # of a margin that holds

@@ -62,9 +62,10 @@ def test_a_dead_band_ends_the_cycle_where_the_mass_stops_on_its_edge():
 def test_the_end_of_the_family_is_where_simulations_cease_to_hunt():
     plant, options = MassOnGuide().actuator(), {"inputs": {"reference": 1.0}, "duration": 300.0}
     exact = hunting_boundary(plant, "controller.integral", (15.0, 30.0), **options)
-    assert exact.end.kind == "loss of stick"
+    assert exact.end.kind == "crossing-sliding"
+    assert "and with it all sticking" in exact.end.reason
     assert exact.exact
-    assert [stretch.ends for stretch in exact.stretches] == [exact.value]
+    assert [interval.ends for interval in exact.intervals] == [exact.value]
     assert exact.branches[0].end == exact.end
     runs = bisect_by_simulation(plant, "controller.integral", (15.0, 30.0), **options)
     assert exact.value == pytest.approx(runs.value, rel=0.01)
@@ -91,7 +92,8 @@ def test_with_backlash_too_the_last_family_ends_where_simulations_cease_to_hunt(
     options = {"inputs": {"reference": 0.1}, "start": start, "duration": 20.0}
     exact = hunting_boundary(with_backlash(), "controller.integral", (365.0, 420.0), **options)
     assert exact.exact
-    assert exact.end.kind == "loss of stick"
+    assert exact.end.kind == "crossing-sliding"
+    assert "and with it all sticking" in exact.end.reason
     runs = bisect_by_simulation(with_backlash(), "controller.integral", (365.0, 420.0), **options)
     assert exact.value == pytest.approx(runs.value, rel=0.01)
 

@@ -2,6 +2,18 @@
 
 A family turns back at a fold, or at a corner where its sequence of modes changes; multipliers leave the unit circle;
 the period grows or the amplitude shrinks without end; or no step leads on, and the last orbit tells why.
+
+Where a mode of friction comes or goes, the bifurcation has a class. Sticking is sliding along the surface of zero slip,
+in the sense of Filippov:
+
+    crossing-sliding    a standstill between slips in opposite directions disappears
+    grazing-sliding     one between slips in the same direction does, or a slip touches zero speed
+    adding-sliding      a contact that sticks touches its friction limit
+    grazing             teeth, a coupling or a stop touch
+
+References
+----------
+M. di Bernardo, C. J. Budd, A. R. Champneys, P. Kowalczyk, "Piecewise-smooth Dynamical Systems" (2008), chapters 6 to 8.
 """
 
 import itertools
@@ -15,20 +27,15 @@ from actuator.orbits.flow import along
 from actuator.orbits.orbit import Orbit
 from actuator.orbits.sampled import SampledOrbit
 from actuator.system.contact_modes import STUCK, contact_labels
+from actuator.system.hybrid import EventKind
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FOLD, BOUND = "fold", "bound"
 PERIOD_DOUBLING, TORUS = "period doubling", "Neimark-Sacker"
-LOSS_OF_STICK, COLLISION, GRAZING, VANISHES, ENDLESS, LOST = (
-    "loss of stick",
-    "border collision",
-    "grazing",
-    "amplitude zero",
-    "period infinite",
-    "lost",
-)
+CROSSING_SLIDING, GRAZING_SLIDING, ADDING_SLIDING = "crossing-sliding", "grazing-sliding", "adding-sliding"
+GRAZING, VANISHES, ENDLESS, LOST = "grazing", "amplitude zero", "period infinite", "lost"
 LONG, SMALL = 50.0, 0.02  # times the first period, part of the first amplitude
 BRIEF, TOUCHES = 0.02, 0.02  # part of the period, and of the usual size of a margin: what is about to disappear
 SHORTENS = 1e-4  # part of a standstill by which it gets shorter at least, from orbit to orbit
@@ -37,7 +44,7 @@ SHORTENS = 1e-4  # part of a standstill by which it gets shorter at least, from 
 class End(NamedTuple):
     """Where a family of orbits ends."""
 
-    kind: str  # "fold", "period doubling", "Neimark-Sacker", "loss of stick", "border collision", ...
+    kind: str  # "fold", "period doubling", "Neimark-Sacker", "crossing-sliding", "grazing-sliding", ...
     value: float  # of the parameter
     reason: str  # in a sentence, with numbers
 
@@ -130,10 +137,11 @@ def diagnose_end(points: list[Point], reason: str) -> End:
     last = points[-1].orbit
     value = points[-1].value
     if _standstills(last) and _shortest_standstill(last) < BRIEF * last.period:
-        return End(_loss(last), value, f"a standstill of {_shortest_standstill(last):.3g} s disappears; {reason}")
-    worst = _nearest_touch(last)
-    if worst[0] < TOUCHES:
-        return End(GRAZING, value, f"{worst[1]} comes down to {worst[0]:.3g} of its usual size; {reason}")
+        kind, what = _classify_loss(last)
+        return End(kind, value, f"{what}; {reason}")
+    touch, event, kind = _nearest_touch(last)
+    if touch < TOUCHES:
+        return End(kind, value, f"{event} comes down to {touch:.3g} of its usual size; {reason}")
     return End(LOST, value, reason)
 
 
@@ -161,11 +169,12 @@ def _corner(points: list[Point], point: Point) -> End:
         value += (last.value - points[-2].value) * shortest / max(before - shortest, SHORTENS * before)
         reach = abs(last.value - points[-2].value) + abs(point.value - last.value)
         value = float(np.clip(value, last.value - reach, last.value + reach))
-    return End(_loss(last.orbit), value, f"a standstill of {shortest:.3g} s disappears, and the family turns back")
+    kind, what = _classify_loss(last.orbit)
+    return End(kind, value, f"{what}, and the family turns back")
 
 
 def _stands(orbit: Orbit) -> list[float]:
-    """Durations of the stretches in which some contact sticks, in one sequence of modes."""
+    """Durations of the intervals in which some contact sticks, in one sequence of modes."""
     found: list[float] = []
     for modes, group in itertools.groupby(orbit.segments, key=lambda segment: segment.modes):
         if STUCK in contact_labels(orbit.system, modes).values():
@@ -181,18 +190,33 @@ def _shortest_standstill(orbit: Orbit) -> float:
     return min(_stands(orbit))
 
 
-def _loss(orbit: Orbit) -> str:
-    """What it is that a brief standstill disappears: the end of all sticking, or a border between two sequences."""
-    return LOSS_OF_STICK if max(_stands(orbit)) < 2 * BRIEF * orbit.period else COLLISION
+def _classify_loss(orbit: Orbit) -> tuple[str, str]:
+    """The class of the bifurcation in which the shortest standstill disappears, and what disappears in words."""
+    stands, labels = _stands(orbit), [contact_labels(orbit.system, modes) for modes in orbit.sequence]
+    sticking = [k for k, row in enumerate(labels) if STUCK in row.values()]
+    k, count = sticking[int(np.argmin(stands))], len(labels)
+    kind = GRAZING_SLIDING
+    for name in (name for name, label in labels[k].items() if label == STUCK):
+        # the slips of this contact before and after, around the period
+        around = [labels[(k + j) % count][name] for j in range(1, count)]
+        slips = [label for label in around if label != STUCK]
+        if slips and slips[0] != slips[-1]:
+            kind = CROSSING_SLIDING
+    what = f"a standstill of {min(stands):.3g} s disappears"
+    return kind, f"{what}, and with it all sticking" if max(stands) < 2 * BRIEF * orbit.period else what
 
 
-def _nearest_touch(orbit: Orbit) -> tuple[float, str]:
-    """Smallest minimum of a margin inside a segment, and its name."""
-    found = (np.inf, "")
+def _nearest_touch(orbit: Orbit) -> tuple[float, str, str]:
+    """Smallest minimum of a margin inside a segment, its name, and the class of bifurcation where it is zero."""
+    found = (np.inf, "", GRAZING)
     for segment, start in zip(orbit.segments, orbit.starts, strict=True):
         states = orbit.map.path(start, segment.modes, orbit.u, orbit.p, segment.duration)
         margins = along(orbit.system.margins, states, segment.modes, orbit.u, orbit.p)
         inside = (margins[:, 1:-1] < margins[:, :-2]) & (margins[:, 1:-1] < margins[:, 2:])
+        labels = contact_labels(orbit.system, segment.modes)
         for row, k in zip(*np.nonzero(inside), strict=True):
-            found = min(found, (float(margins[row, k + 1]), orbit.system.margin_names[row]))
+            event, kind = orbit.system.events[row], GRAZING
+            if event.kind is EventKind.FRICTION:
+                kind = ADDING_SLIDING if labels.get(event.at) == STUCK else GRAZING_SLIDING
+            found = min(found, (float(margins[row, k + 1]), event.name, kind))
     return found

@@ -7,9 +7,8 @@ from typing import NamedTuple, TypeVar
 import control
 import numpy as np
 
-from actuator.linear.margins.crossings import CUT, SLOW
-
 FREQUENCIES = 2 * np.pi * np.logspace(-2, 4, 1500)  # rad/s
+CUT, SLOW = 1e-6, 1e-2  # a response whose gain is below CUT above SLOW rad/s lets nothing pass
 HIGHEST_PHASE = 0.5 * np.pi  # at which a response may start; the lowest is a turn below
 Gain = TypeVar("Gain", float, np.ndarray)
 

@@ -283,24 +283,16 @@ def format_peak(peak: Peak) -> str:
 def _margin(found: Margins | LiftedMargins, mode: str, curves: Sensitivities) -> dict[str, Any]:
     peaks = [format_peak(curves.sensitivity_peak), format_peak(curves.complementary_peak)]
     closed = "stable" if found.stable else "unstable"
-    if isinstance(found, LiftedMargins):
-        low, high = (to_db(value) for value in (found.lower_gain, found.upper_gain))
-        gain = f"{number(low)} to {number(high)}"
-        cells = [gain, number(math.degrees(found.phase_rad)), "–", "–", *peaks]
-        return {
-            "mode": mode,
-            "closed": closed,
-            "cells": cells,
-            "gains": "of all values in a period together",
-            "phases": "",
-        }
     cells = [
-        number(found.gain_db),
+        " to ".join(map(number, found.range_db)),
         number(found.phase_deg),
-        number(1e3 * found.delay_s),
-        number(found.disk.size),
+        "–" if found.delay_s is None else number(1e3 * found.delay_s),
+        "–" if found.disk is None else number(found.disk.size),
         *peaks,
     ]
+    if found.gain_crossings is None or found.phase_crossings is None:
+        gains, phases = "of all values in a period together", ""
+        return {"mode": mode, "closed": closed, "cells": cells, "gains": gains, "phases": phases}
     gains = "; ".join(
         f"{c.frequency / (2 * math.pi):.4g} Hz: {math.degrees(c.phase_rad):.1f}°, {1e3 * c.delay_s:.3g} ms"
         for c in found.gain_crossings

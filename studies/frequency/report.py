@@ -3,13 +3,12 @@
 import base64
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from actuator import LiftedMargins, Margins, Spectrum
+from actuator import Spectrum
 from actuator.linear.margins.sensitivity import Sensitivities
 from actuator.plots.bode import plot_modes
 from studies.cache import program_fingerprint
@@ -184,7 +183,7 @@ def _result(study: CaseResponse) -> dict[str, Any]:
         "modes": {model.name: model.contacts for model in linear.models},
         "unreachable": dict(linear.models.unreachable),
         "margins": {
-            at: {mode: _margin_numbers(found) for mode, found in modes.items()} for at, modes in linear.margins.items()
+            at: {mode: found.numbers() for mode, found in modes.items()} for at, modes in linear.margins.items()
         },
         "sensitivity": {
             at: {mode: each and _peaks(each) for mode, each in modes.items()}
@@ -222,9 +221,3 @@ def _result(study: CaseResponse) -> dict[str, Any]:
 def _peaks(found: Sensitivities) -> dict[str, Any]:
     """Peaks of S and T, with their frequencies [rad/s]."""
     return {"S": found.sensitivity_peak._asdict(), "T": found.complementary_peak._asdict()}
-
-
-def _margin_numbers(found: Margins | LiftedMargins) -> dict[str, Any]:
-    if isinstance(found, LiftedMargins):
-        return asdict(found)
-    return {"gain_db": found.gain_db, **asdict(found)}

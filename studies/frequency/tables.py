@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import xarray
 
-from actuator import LiftedMargins
 from actuator.linear.bode import to_db
 from studies.frequency.plan import Plan
 from studies.frequency.study import CaseResponse
@@ -92,18 +91,8 @@ def margin_rows(studies: Sequence[CaseResponse]) -> Iterable[Sequence[Any]]:
         for at, modes in study.linear.margins.items():
             for mode, found in modes.items():
                 start = (study.case.name, at, mode)
-                if isinstance(found, LiftedMargins):
-                    yield (*start, "lower gain", "", found.lower_gain, "-")
-                    yield (*start, "upper gain", "", found.upper_gain, "-")
-                    yield (*start, "phase", "", math.degrees(found.phase_rad), "deg")
-                    continue
-                for gain in found.gain_crossings:
-                    hertz = gain.frequency / (2 * math.pi)
-                    yield (*start, "phase margin", hertz, math.degrees(gain.phase_rad), "deg")
-                    yield (*start, "delay margin", hertz, gain.delay_s, "s")
-                for phase in found.phase_crossings:
-                    yield (*start, "gain margin", phase.frequency / (2 * math.pi), to_db(phase.gain), "dB")
-                yield (*start, "disk size", found.disk.frequency / (2 * math.pi), found.disk.size, "-")
+                for quantity, frequency, value, unit in found.rows():
+                    yield (*start, quantity, "" if frequency is None else frequency / (2 * math.pi), value, unit)
         for at, modes in study.linear.sensitivities.items():
             for mode, each in modes.items():
                 for word, peak in (("S", each.sensitivity_peak), ("T", each.complementary_peak)) if each else ():

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -33,35 +32,25 @@ class Curves:
 
     @property
     def sampled(self) -> bool:
-        """Whether the model is in discrete time."""
-        return isinstance(self.model, SampledGainModel)
+        """Whether the model ends at a Nyquist frequency."""
+        return math.isfinite(self.model.highest())
 
     def frequencies(self, at: str | None = None) -> np.ndarray:
         """The grid [rad/s]: with a sampled controller up to the Nyquist frequency of a signal, or of all signals."""
-        end = self.model.highest(at) * NYQUIST if isinstance(self.model, SampledGainModel) else math.inf
+        end = self.model.highest(at) * NYQUIST
         return FREQUENCIES if end > FREQUENCIES[-1] else np.append(FREQUENCIES[end > FREQUENCIES], end)
 
     def loop(self, at: str) -> np.ndarray:
         """Loop transfer on its grid, opened at a signal."""
-        if isinstance(self.model, SampledGainModel):
-            return self.model.loops(at, self.frequencies(at))
-        closed = self.response(PREFIX + at, at)
-        return -closed / (1 + closed)
+        return self.model.loops(at, self.frequencies(at))
 
     def response(self, given: str, seen: str) -> np.ndarray:
         """Response of an output to an input, on the common grid."""
-        if isinstance(self.model, SampledGainModel):
-            return self.model.responses(given, seen, self.frequencies())
-        return self._table[:, self.model.seen.index(seen), self.model.given.index(given)]
+        return self.model.responses(given, seen, self.frequencies())
 
     def spacing(self, step: float) -> float:
         """The time step [s] next to this one for which there is a step response."""
-        return self.model.spacing(step) if isinstance(self.model, SampledGainModel) else step
-
-    @cached_property
-    def _table(self) -> np.ndarray:
-        assert isinstance(self.model, GainModel)
-        return self.model.table(FREQUENCIES)
+        return self.model.spacing(step)
 
 
 def curves_at(point: OperatingPoint, gains: Mapping[str, float], resting: OperatingPoint | None = None) -> Curves:

@@ -1,5 +1,6 @@
 """Linear models with their exact derivatives by named parameters, for tuning: responses to sines and steps."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -11,6 +12,7 @@ from scipy.linalg import expm, expm_frechet
 from actuator.linear.derivatives.slopes import flow_slopes, indices_of, point_sensitivity
 from actuator.linear.jacobians import require_smooth
 from actuator.linear.operating_point import OperatingPoint
+from controllers.loop import PREFIX
 
 
 class Value(NamedTuple):
@@ -65,10 +67,32 @@ class GainModel:
         poles = np.linalg.eigvals(self.a)
         return bool((poles.real <= 1e-9 * abs(poles).max()).all())
 
-    def table(self, frequencies: np.ndarray) -> np.ndarray:
-        """All responses, (f, seen, given), at frequencies [rad/s]."""
-        s = 1j * frequencies[:, None, None]
-        return self.c @ np.linalg.solve(s * np.eye(len(self.a)) - self.a, self.b + 0j) + self.d
+    def highest(self, at: str | None = None) -> float:  # noqa: ARG002 - asked as SampledGainModel is
+        """The highest frequency at which there is a response [rad/s]: no limit in continuous time."""
+        return math.inf
+
+    def spacing(self, step: float) -> float:
+        """The step of time next to this one at which there is a step response [s]: any."""
+        return step
+
+    def responses(self, given: str, seen: str, frequencies: np.ndarray) -> np.ndarray:
+        """Response of one output to sines of one input, at frequencies [rad/s], without derivatives."""
+        table = self._tables.get(frequencies.tobytes())
+        if table is None:
+            s = 1j * frequencies[:, None, None]
+            table = self.c @ np.linalg.solve(s * np.eye(len(self.a)) - self.a, self.b + 0j) + self.d
+            self._tables[frequencies.tobytes()] = table
+        return table[:, self.seen.index(seen), self.given.index(given)]
+
+    @cached_property
+    def _tables(self) -> dict[bytes, np.ndarray]:
+        """All responses, (f, seen, given), by frequencies."""
+        return {}
+
+    def loops(self, at: str, frequencies: np.ndarray) -> np.ndarray:
+        """Loop transfer with the loop opened at a named signal, without derivatives."""
+        closed = self.responses(PREFIX + at, at, frequencies)
+        return -closed / (1 + closed)
 
     def response(self, given: str, seen: str, frequencies: np.ndarray | Sequence[float]) -> Response:
         """Response of one output to sines of one input [rad/s]."""
@@ -87,7 +111,7 @@ class GainModel:
 
         T is the response of the signal as computed to what is added to it, all loops closed.
         """
-        closed = self.response(f"inject.{at}", at, frequencies)
+        closed = self.response(PREFIX + at, at, frequencies)
         factor = -1 / (1 + closed.value) ** 2
         return Response(
             -closed.value / (1 + closed.value), factor[:, None] * closed.slopes, factor * closed.by_frequency

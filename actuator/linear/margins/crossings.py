@@ -1,15 +1,16 @@
 """Stability margins of a loop, in continuous or in discrete time: every crossing, and the disk around one."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import control
 import numpy as np
 
+from actuator.linear.bode import CUT, SLOW, to_db
 from actuator.linear.margins.disk import DiskMargin, disk_margin, disk_of, peak_of
 from actuator.linear.margins.response import GRID, NOTHING, LoopResponse
-
-CUT, SLOW = 1e-6, 1e-2  # a loop whose gain is below CUT above SLOW rad/s is cut
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,25 @@ class Margins:
     @property
     def gain_db(self) -> float:
         """Gain margin [dB]."""
-        return 20 * math.log10(self.gain)
+        return to_db(self.gain)
+
+    @property
+    def range_db(self) -> tuple[float, ...]:
+        """Gain margins that belong together [dB]: the one nearest to zero."""
+        return (self.gain_db,)
+
+    def rows(self) -> Iterator[tuple[str, float | None, float, str]]:
+        """Every margin: what it is, at which frequency [rad/s] (None: at none of its own), its value and its unit."""
+        for gain in self.gain_crossings:
+            yield "phase margin", gain.frequency, math.degrees(gain.phase_rad), "deg"
+            yield "delay margin", gain.frequency, gain.delay_s, "s"
+        for phase in self.phase_crossings:
+            yield "gain margin", phase.frequency, to_db(phase.gain), "dB"
+        yield "disk size", self.disk.frequency, self.disk.size, "-"
+
+    def numbers(self) -> dict[str, Any]:
+        """All of it for machines."""
+        return {"gain_db": self.gain_db, **asdict(self)}
 
     @property
     def phase_deg(self) -> float:

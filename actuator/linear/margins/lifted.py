@@ -1,13 +1,15 @@
 """Margins of a sampled loop whose signal is renewed several times in the period of the slowest clock."""
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from typing import Any, ClassVar
 
 import control
 import numpy as np
 from scipy.optimize import brentq
 
+from actuator.linear.bode import to_db
 from actuator.linear.poles import rounding_bound
 
 GAINS = np.logspace(-4, 4, 1601)  # factors on the loop gain that are tried
@@ -37,6 +39,32 @@ class LiftedMargins:
     upper_gain: float
     phase_rad: float
     peak_sensitivity: float
+
+    # asked as `Margins` is, of which these have no counterpart
+    delay_s: ClassVar[None] = None
+    disk: ClassVar[None] = None
+    gain_crossings: ClassVar[None] = None
+    phase_crossings: ClassVar[None] = None
+
+    @property
+    def phase_deg(self) -> float:
+        """Phase margin [deg]."""
+        return math.degrees(self.phase_rad)
+
+    @property
+    def range_db(self) -> tuple[float, ...]:
+        """Gain margins that belong together [dB]: the lower and the upper one."""
+        return to_db(self.lower_gain), to_db(self.upper_gain)
+
+    def rows(self) -> Iterator[tuple[str, float | None, float, str]]:
+        """As of `Margins`; none has a frequency of its own."""
+        yield "lower gain", None, self.lower_gain, "-"
+        yield "upper gain", None, self.upper_gain, "-"
+        yield "phase", None, self.phase_deg, "deg"
+
+    def numbers(self) -> dict[str, Any]:
+        """All of it for machines."""
+        return asdict(self)
 
 
 def lifted_margins(loop: control.StateSpace) -> LiftedMargins:

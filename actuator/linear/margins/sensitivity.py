@@ -7,9 +7,8 @@ from typing import NamedTuple
 import control
 import numpy as np
 
-from actuator.linear.bode import FREQUENCIES
+from actuator.linear.bode import CUT, FREQUENCIES, SLOW
 from actuator.linear.loop import loop_transfer
-from actuator.linear.margins.crossings import CUT, SLOW
 from actuator.linear.model import linearize
 from actuator.linear.operating_point import OperatingPoint
 

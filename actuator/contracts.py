@@ -53,13 +53,13 @@ CYCLE = StickingCycle(
 
 def motor_contract(motor: Any) -> Iterator[Check]:
     """What a motor has to keep, by what drives it."""
-    yield from (check_units, check_limit, check_drives)
+    yield from (check_units, check_limit, check_drives, check_motor_symbols)
     if motor.driven_by != "torque":
         yield check_torque_of_its_current
     if motor.driven_by == "current":
         yield check_demanded_current
     if motor.driven_by == "voltage":
-        yield from (check_power_balance, check_winding_symbols)
+        yield check_power_balance
 
 
 def check_limit(motor: Any) -> None:
@@ -110,14 +110,17 @@ def check_power_balance(motor: Any) -> None:
         )
 
 
-def check_winding_symbols(motor: Any) -> None:
-    """Derivatives and torque are the same for numbers and for symbols, of the motor's own numbers too."""
+def check_motor_symbols(motor: Any) -> None:
+    """Its laws are the same for numbers and for symbols, of the motor's own numbers too."""
     symbolic, parameters = parameterize(motor, "motor")
-    currents = [2.0 - k for k in range(len(motor.axes))]
+    currents = [2.0 - k for k in range(max(len(motor.axes), motor.driven_by != "torque"))]
     voltages = [5.0 + k for k in range(len(motor.axes))]
 
     def laws(part: Any, currents: list, voltages: list, angle: Any, speed: Any) -> list:
-        return [*part.derivatives(currents, voltages, speed), part.shaft_torque(currents, angle, speed)]
+        if part.driven_by == "torque":
+            return [part.allow_torque(speed)]
+        inputs = (voltages, speed) if part.driven_by == "voltage" else (5.0,)
+        return [*part.derivatives(currents, *inputs), part.shaft_torque(currents, angle, speed), part.torque(currents)]
 
     _compare(motor, laws, symbolic, parameters, (currents, voltages, 0.3, 20.0))
 

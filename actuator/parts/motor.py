@@ -43,7 +43,7 @@ class Motor(Protocol):
         return torque
 
     def without_saturation(self) -> "Motor":
-        """The same motor with constant inductances."""
+        """The same motor with a linear magnetic circuit: `current_for` and `torque` undo each other at any torque."""
         return self
 
 

@@ -178,7 +178,7 @@ def run_study(plan: Callable[[], Study], folder: Path, *, jobs: int = 1, first: 
         click.echo(
             f"{len(cache) - before} results computed in {seconds:.3g} s, {len(cache.reused)} reused from {cache.path}"
         )
-    named = next(path for path in written if path.name == first)
+    named = next((path for path in written if path.name == first), written[0])
     click.echo(f"written: {named} and {len(written) - 1} more files")
     return found
 

@@ -63,6 +63,8 @@ def test_rooms_are_entered_in_one_direction(file):
     if file.name in OPEN or room == PICTURES:
         return
     rooms, beside = ROOMS[package]
+    if room not in rooms and package == "studies" and len(file.parts) > len(("studies", "file.py")):
+        return  # a new study may build on all others
     last = room if room in rooms else beside
     modules = {node.module or "" for node in ast.walk(parsed(file)) if isinstance(node, ast.ImportFrom)}
     entered = {name.split(".")[1] for name in modules if name.startswith(f"{package}.")} & set(rooms)

@@ -2,8 +2,8 @@
 
     static: Annotated[Coefficient, Breakaway(floor="sliding")]
 
-An analysis asks the system for what has a role (`system.parameters_having(Breakaway)`, `signals_having`) and reads no meaning off a name. A new
-role is a new class here; a quantity may have several.
+An analysis asks the system for what has a role (`system.parameters_having(Breakaway)`, `signals_having`) and reads no
+meaning off a name. A new role is a new class here; a quantity may have several.
 """
 
 from dataclasses import dataclass

@@ -10,12 +10,15 @@ The outer cycle has 2 r^2 = 1 + sqrt(1 + 4 mu); it ends in a fold at mu = -1/4. 
 """
 
 from functools import cache
+from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
 import pytest
 
 from actuator import HybridSystem, continue_orbit, find_orbit, simulate
+from actuator.continuation.bifurcations import classify_loss
+from actuator.orbits.segments import Segment
 from actuator.system.hybrid import MARGIN_BAND, Contact, Event, Mode, Place, Quantity
 from actuator.system.parameters import Parameter
 
@@ -90,3 +93,25 @@ def test_behind_the_doubling_the_cycle_takes_two_turns():
     found = orbit(0.05)
     assert found.period == pytest.approx(4 * np.pi, rel=1e-8)
     assert found.stable
+
+
+@pytest.mark.parametrize(
+    ("slips", "kind", "last"),
+    [
+        ((1, 0, -1, 0), "crossing-sliding", True),  # the only contact sticks between a slip and the one back
+        ((1, 0, 1, 0), "grazing-sliding", True),  # between slips in the same direction
+        ((1, 0, -1, 0), "crossing-sliding", False),
+    ],
+)
+def test_a_standstill_that_disappears_has_the_class_of_the_slips_around_it(slips, kind, last):
+    contact = Contact("guide", Place.BEARING, "guide.motion", None, 1)
+    durations = (0.5, 1e-3, 0.5, 2e-3 if last else 0.5)
+    orbit = SimpleNamespace(
+        system=SimpleNamespace(modes=("guide.motion",), contacts=(contact,)),
+        segments=tuple(Segment((mode,), (), duration, 0) for mode, duration in zip(slips, durations, strict=True)),
+        sequence=tuple((mode,) for mode in slips),
+        period=sum(durations),
+    )
+    found, words = classify_loss(orbit)
+    assert found == kind
+    assert words == "a standstill of 0.001 s disappears" + (", and with it all sticking" if last else "")

@@ -465,6 +465,17 @@ def test_a_conditionally_stable_loop_has_a_lower_gain_margin():
     )
 
 
+def test_margins_of_one_signal_and_of_several_values_are_asked_in_one_way():
+    one = margins(control.ss(EXAMPLES["conditionally stable"]))
+    several = lifted_margins(control.ss(0.5 * np.eye(2), np.eye(2), 0.1 * np.eye(2), np.zeros((2, 2)), 1.0))
+    assert one.range_db == (one.gain_db,)
+    assert several.range_db == pytest.approx((-math.inf, 20 * math.log10(15)))  # 0.5 - 0.1 k leaves the circle at 15
+    for found in (one, several):
+        assert {unit for _, _, _, unit in found.rows()} <= {"dB", "deg", "s", "-"}
+        assert found.numbers()["stable"] is found.stable
+    assert [frequency for _, frequency, _, _ in several.rows()] == [None] * 3
+
+
 # -- poles --------------------------------------------------------------------------------------------------
 
 

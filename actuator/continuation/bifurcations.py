@@ -137,7 +137,7 @@ def diagnose_end(points: list[Point], reason: str) -> End:
     last = points[-1].orbit
     value = points[-1].value
     if _standstills(last) and _shortest_standstill(last) < BRIEF * last.period:
-        kind, what = _classify_loss(last)
+        kind, what = classify_loss(last)
         return End(kind, value, f"{what}; {reason}")
     touch, event, kind = _nearest_touch(last)
     if touch < TOUCHES:
@@ -169,7 +169,7 @@ def _corner(points: list[Point], point: Point) -> End:
         value += (last.value - points[-2].value) * shortest / max(before - shortest, SHORTENS * before)
         reach = abs(last.value - points[-2].value) + abs(point.value - last.value)
         value = float(np.clip(value, last.value - reach, last.value + reach))
-    kind, what = _classify_loss(last.orbit)
+    kind, what = classify_loss(last.orbit)
     return End(kind, value, f"{what}, and the family turns back")
 
 
@@ -190,7 +190,7 @@ def _shortest_standstill(orbit: Orbit) -> float:
     return min(_stands(orbit))
 
 
-def _classify_loss(orbit: Orbit) -> tuple[str, str]:
+def classify_loss(orbit: Orbit) -> tuple[str, str]:
     """The class of the bifurcation in which the shortest standstill disappears, and what disappears in words."""
     stands, labels = _stands(orbit), [contact_labels(orbit.system, modes) for modes in orbit.sequence]
     sticking = [k for k, row in enumerate(labels) if STUCK in row.values()]

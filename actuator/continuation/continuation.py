@@ -71,7 +71,7 @@ def continue_orbit(
     Returns
     -------
     Branch
-        With sampled controllers a fold is not told from other ends ("lost"), as only one side of it is followed.
+        With sampled controllers a fold cannot be told from other ends ("lost"), as only one side of it is followed.
 
     Raises
     ------

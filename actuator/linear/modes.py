@@ -36,7 +36,7 @@ class ModeModel:
     point : OperatingPoint
         State and modes; `linearize`, `loop_transfer` and `poles` take it.
     equilibrium : bool
-        Whether it rests there. A mesh in its gap does not: its model holds while it flies.
+        Whether the point is an equilibrium. With the teeth separated there is none: the model is valid only meanwhile.
     """
 
     name: str
@@ -55,11 +55,11 @@ class ModeModel:
         return [] if self.equilibrium else [quantity.name for quantity in self.point.system.states]
 
     def linear(self, inputs: Sequence[str], outputs: Sequence[str]) -> control.StateSpace:
-        """As `linearize`, without what is locked."""
+        """As `linearize`, without states that stuck contacts make redundant."""
         return linearize(self.point, inputs, outputs, drifting=self.drifting, minimal=True)
 
     def loop(self, at: str) -> control.StateSpace:
-        """As `loop_transfer`, without what is locked."""
+        """As `loop_transfer`, without states that stuck contacts make redundant."""
         return loop_transfer(self.point, at, drifting=self.drifting, minimal=True)
 
 
@@ -124,7 +124,8 @@ def linearize_modes(
     """One linear model per contact mode that can be reached at an operating point.
 
     A mode can be reached where there is a state of rest in it in which friction holds the contacts that are stuck;
-    flanks follow from the load. Each mesh or coupling with a gap adds the model of its flight, with all else sliding.
+    flanks follow from the load. Each mesh or coupling with a gap adds the model with its teeth separated and all else
+    sliding.
     Sensors are taken to read between their counts, without noise: a step has no derivative.
 
     Parameters
@@ -168,8 +169,8 @@ def linearize_modes(
         for stuck in _mixed(contacts):
             words = {name: STUCK if name in stuck else model.contacts[name] for name in contacts}
             attempt(f"{model.name}, stuck {_short(stuck)}", model.direction, words, model.point.states)
-    flights = [_in_gap(model, name) for model in sliding for name in _find_gaps(system)]
-    return ModeModels(models=(*found, *flights), unreachable={name: str(reason) for name, reason in reasons.items()})
+    separated = [_in_gap(model, name) for model in sliding for name in _find_gaps(system)]
+    return ModeModels(models=(*found, *separated), unreachable={name: str(reason) for name, reason in reasons.items()})
 
 
 def _mixed(contacts: Sequence[str]) -> Iterator[tuple[str, ...]]:
@@ -192,6 +193,6 @@ def _in_gap(model: ModeModel, name: str) -> ModeModel:
     point, system = model.point, model.point.system
     inside = np.array([mode.at == name for mode in system.mode_variables])
     m = np.where(inside, 0.0, point.m)
-    flight = OperatingPoint(system=system, x=point.x, m=m, u=point.u, p=point.p, rates=point.rates)
+    separated = OperatingPoint(system=system, x=point.x, m=m, u=point.u, p=point.p, rates=point.rates)
     label = f"{model.name}, {FREE} {_short([name])}"
-    return ModeModel(name=label, direction=model.direction, point=flight, equilibrium=False)
+    return ModeModel(name=label, direction=model.direction, point=separated, equilibrium=False)

@@ -34,7 +34,7 @@ class Balance:
         self.equations, self.moves = np.array(self.kept)[unknown], self.expressed[:, unknown]
 
     def express(self, state: np.ndarray) -> np.ndarray:
-        """The state, with what is locked as the others have it."""
+        """The state, with those that stuck contacts make redundant as the others have it."""
         return self.scale * (self.expressed @ (state / self.scale)[self.kept])
 
     def flow(self, state: np.ndarray) -> np.ndarray:

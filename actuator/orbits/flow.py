@@ -30,30 +30,30 @@ GRID = np.linspace(0, 1, POINTS + 1) ** 3  # parts of a segment; it starts with 
 
 
 class Smooth(NamedTuple):
-    """Expressions of (x, m, u, p) with their corners held."""
+    """Expressions of (x, m, u, p) with their switching surfaces held."""
 
     arguments: list[ca.SX]  # x, m, u, p
-    sides: ca.SX  # (K, 1): +1 or -1, the side of each corner
+    sides: ca.SX  # (K, 1): +1 or -1, the side of each surface
     results: list[ca.SX]  # smooth while the sides are held
-    corners: ca.SX  # (K, 1): zero at the corner, with the sign of the side; with the other corners held
-    true_corners: ca.SX  # (K, 1): with nothing held
+    surfaces: ca.SX  # (K, 1): zero on the surface, with the sign of the side; with the others held
+    true_surfaces: ca.SX  # (K, 1): with nothing held
 
 
-def hold_corners(function: ca.Function) -> Smooth:
-    """The results of an SX function of (x, m, u, p) with every corner in x held on one side."""
+def hold_surfaces(function: ca.Function) -> Smooth:
+    """The results of an SX function of (x, m, u, p) with every switching surface in x held on one side."""
     arguments = [ca.SX.sym(name, function.size1_in(k)) for k, name in enumerate("xmup")]
     _, true = _walk(function, arguments, None)
     sides = ca.SX.sym("sides", len(true))
     results, held = _walk(function, arguments, sides)
-    return Smooth(arguments, sides, results, *(ca.vertcat(ca.SX(0, 1), *kinks) for kinks in (held, true)))
+    return Smooth(arguments, sides, results, *(ca.vertcat(ca.SX(0, 1), *parts) for parts in (held, true)))
 
 
 def _walk(function: ca.Function, arguments: list[ca.SX], sides: ca.SX | None) -> tuple[list[ca.SX], list[ca.SX]]:
-    """Results of the function and its corners, operation by operation; `sides` None for nothing held."""
+    """Results of the function and its surfaces, operation by operation; `sides` None for nothing held."""
     entries = [ca.vertsplit(argument) for argument in arguments]
     results = [ca.SX(function.sparsity_out(k)) for k in range(function.n_out())]
     work: dict[int, ca.SX] = {}
-    corners: list[ca.SX] = []
+    surfaces: list[ca.SX] = []
     for k in range(function.n_instructions()):
         operation, read, written = (
             function.instruction_id(k),
@@ -68,18 +68,18 @@ def _walk(function: ca.Function, arguments: list[ca.SX], sides: ca.SX | None) ->
             results[written[0]].nz[written[1]] = work[read[0]]
         else:
             values = [work[index] for index in read]
-            corner = values[0] - values[1] if operation in ORDERS else values[0] if operation in SIZES else None
-            if corner is not None and ca.depends_on(corner, arguments[0]):
-                corners.append(corner)
+            surface = values[0] - values[1] if operation in ORDERS else values[0] if operation in SIZES else None
+            if surface is not None and ca.depends_on(surface, arguments[0]):
+                surfaces.append(surface)
                 if sides is not None:
-                    work[written[0]] = _one_side(operation, values, sides[len(corners) - 1] > 0)
+                    work[written[0]] = _one_side(operation, values, sides[len(surfaces) - 1] > 0)
                     continue
             work[written[0]] = (ca.SX.unary if len(values) == 1 else ca.SX.binary)(operation, *values)
-    return results, corners
+    return results, surfaces
 
 
 def _one_side(operation: int, values: list[ca.SX], above: ca.SX) -> ca.SX:
-    """The operation on one side of its corner."""
+    """The operation on one side of its surface."""
     if operation == ca.OP_FMAX:
         return ca.if_else(above, values[0], values[1])
     if operation == ca.OP_FMIN:
@@ -105,11 +105,11 @@ class FlowMap:
     Attributes
     ----------
     rows : Function
-        (x, modes and sides, u, p) -> margins followed by corners of the flow, their derivatives by x and by p, flow.
+        (x, modes and sides, u, p) -> margins followed by switching surfaces, their derivatives by x and by p, flow.
     names, events : list of str, int
         Of these rows; how many of them are margins.
-    corners : Function
-        (x, m, u, p) -> the quantities that change sign at the corners of the flow.
+    surfaces : Function
+        (x, m, u, p) -> the quantities that change sign at the switching surfaces.
     tangent, reset_tangent : Function
         Derivatives of `advance` and of the state after an event in BLOCK directions, for `directional`.
     """
@@ -120,7 +120,7 @@ class FlowMap:
         self.nx, self.grid = len(system.states), GRID
         x, m, u, p = (ca.SX.sym(name, system.flow.size1_in(k)) for k, name in enumerate("xmup"))
         both = [system.flow(x, m, u, p), system.margins(x, m, u, p) - MARGIN_BAND]
-        smooth = hold_corners(ca.Function("both", [x, m, u, p], both, {"cse": True}))
+        smooth = hold_surfaces(ca.Function("both", [x, m, u, p], both, {"cse": True}))
         x, m, u, p = smooth.arguments
         held = [x, ca.vertcat(m, smooth.sides), u, p]
         fast = partial(_fast, compiled=compiled)
@@ -128,12 +128,12 @@ class FlowMap:
         self._end = fast(end)
         self.tangent = fast(end.forward(BLOCK))
         self._path = fast(self._segment("path", system.flow, list(GRID[1:]), {"max_step_size": 2 / POINTS}))
-        rows = ca.vertcat(smooth.results[1], smooth.corners)
+        rows = ca.vertcat(smooth.results[1], smooth.surfaces)
         self.rows = ca.Function(
             "rows", held, [rows, ca.jacobian(rows, x), ca.jacobian(rows, p), smooth.results[0]], {"cse": True}
         )
-        self.corners = ca.Function("corners", [x, m, u, p], [smooth.true_corners])
-        self.names = [*system.margin_names, *(f"corner {k} of the flow" for k in range(smooth.sides.shape[0]))]
+        self.surfaces = ca.Function("surfaces", [x, m, u, p], [smooth.true_surfaces])
+        self.names = [*system.margin_names, *(f"switching surface {k}" for k in range(smooth.sides.shape[0]))]
         self.events = len(system.margin_names)
         # the decision of the modes has no derivative: only what leads to the state after it is kept
         given = [ca.MX.sym(f"given{k}", system.reset.size1_in(k)) for k in range(system.reset.n_in())]

@@ -48,7 +48,7 @@ class Orbit:
     x0 : ndarray
         State at its start, just after an event.
     segments : tuple of Segment
-        Smooth pieces: modes, durations and the margins that end them, corners of the flow included.
+        Smooth pieces: modes, durations and the margins that end them, switching surfaces included.
     starts : tuple of ndarray
         State at the start of each segment.
     residual : float

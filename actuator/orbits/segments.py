@@ -7,7 +7,7 @@ derivatives are those of the integrator; across an event
     dx+ = dr/dx (dx + f dt) + dr/dp dp                the state after it, at its own time
 
 with the margin g, the flow f before and the reset r. At a fixed time, dx+ - f+ dt is the saltation matrix times dx.
-Corners of the flow inside a mode (a limit that is met, say) end a segment, too: they are events that change nothing.
+Switching surfaces inside a mode (a limit that is met, say) end a segment, too: they are events that change nothing.
 
 References
 ----------
@@ -31,7 +31,7 @@ EVENT_STEPS = 25
 EVENT_ROUNDING = 8 * np.finfo(float).eps  # of the duration
 MARGIN_NOISE = 1e-7  # friction of redundant contacts is known to this part of a usual force
 SMALLEST_RATE = 1e-300
-TOUCHES = 0.02  # part of its value one output point earlier; below it a corner is met with the event, not before
+TOUCHES = 0.02  # part of its value one output point earlier; below it a surface is met with the event, not before
 LINGERS = 1e-4, 1e-3  # s, and part of the time since the last; an event that is this near may be the one that happened
 
 
@@ -39,9 +39,9 @@ class Segment(NamedTuple):
     """A smooth piece of motion that ends with an event."""
 
     modes: tuple[int, ...]  # while it lasts
-    sides: tuple[int, ...]  # of the corners of the flow
+    sides: tuple[int, ...]  # of the switching surfaces
     duration: float  # s
-    fired: int  # row that ends it by falling through zero, of the margins followed by the corners of the flow
+    fired: int  # row that ends it by falling through zero, of the margins followed by the switching surfaces
 
     @property
     def held(self) -> tuple[int, ...]:
@@ -224,14 +224,14 @@ def _ended_by(
 def _pieces(
     machine: FlowMap, x: np.ndarray, modes: tuple[int, ...], u: np.ndarray, p: np.ndarray, length: float
 ) -> list[Segment]:
-    """The motion in one mode over `length`, cut at its corners; what ends the last piece is left open."""
+    """The motion in one mode over `length`, cut at its surfaces; what ends the last piece is left open."""
     grid = length * GRID
     states = machine.path(x, modes, u, p, length)
-    corners = along(machine.corners, states, modes, u, p)
-    # at its ends the motion may touch a corner; just before the last event it may go through one
-    touches = abs(corners[:, -1]) < TOUCHES * abs(corners[:, -2])
-    corners[touches, -1] = corners[touches, -2]
-    inside = corners[:, 1:]
+    surfaces = along(machine.surfaces, states, modes, u, p)
+    # at its ends the motion may touch a surface; just before the last event it may go through one
+    touches = abs(surfaces[:, -1]) < TOUCHES * abs(surfaces[:, -2])
+    surfaces[touches, -1] = surfaces[touches, -2]
+    inside = surfaces[:, 1:]
     cuts = []
     for row, k in zip(*np.nonzero(inside[:, 1:] * inside[:, :-1] < 0), strict=True):
         low, high = inside[row, k], inside[row, k + 1]
@@ -239,6 +239,6 @@ def _pieces(
     cuts = [(0.0, -1), *sorted(cuts), (length, -1)]
     found = []
     for (began, _), (ended, row) in itertools.pairwise(cuts):
-        middle = [np.interp((began + ended) / 2, grid, values) for values in corners]
+        middle = [np.interp((began + ended) / 2, grid, values) for values in surfaces]
         found.append(Segment(modes, tuple(1 if value >= 0 else -1 for value in middle), ended - began, row))
     return found

@@ -70,6 +70,7 @@ def integrating(system, names):
     kept, growing = beside(lambda y, powers: y), beside(lambda y, powers: powers)
     return replace(
         system,
+        contact_state=None,  # that of the plain system has fewer states
         states=(
             *system.states[:moving],
             *(Quantity(f"{name}.integral", "J", USUAL) for name in names),

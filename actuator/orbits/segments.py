@@ -23,9 +23,8 @@ from typing import NamedTuple
 import numpy as np
 
 from actuator.orbits.flow import GRID, FlowMap, NoOrbit, along, directional
-from actuator.simulation.engine import engine
-from actuator.simulation.prepared import EngineOptions
 from actuator.simulation.signals import Piece
+from actuator.simulation.simulate import resume
 
 EVENT_STEPS = 25
 EVENT_ROUNDING = 8 * np.finfo(float).eps  # of the duration
@@ -167,12 +166,12 @@ def cut_motion(
     NoOrbit
         Where an event cannot be told from its modes.
     """
-    runs = engine(machine.system, EngineOptions(tolerance=max(machine.tolerance, 1e-9), compiled=machine.compiled))
-    window = runs.run(0.0, duration, x, np.array(m, float), p, [Piece(float(value)) for value in u])
+    inputs, tolerance = [Piece(float(value)) for value in u], max(machine.tolerance, 1e-9)
+    trace = resume(machine.system, 0.0, duration, x, np.array(m, float), inputs, p, np.array([duration]), tolerance)
     found: list[Segment] = []
     states: list[np.ndarray | None] = []
     modes, began = machine.integer_modes(m), 0.0
-    for time, raw in window.events:
+    for time, raw in zip(trace.event_times, trace.event_modes, strict=True):
         after = machine.integer_modes(raw)
         if time <= began or after == modes:
             continue

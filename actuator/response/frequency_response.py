@@ -12,6 +12,7 @@ import numpy as np
 import xarray
 
 from actuator.actuator import Actuator
+from actuator.engine.model import model
 from actuator.response.sine import SinePoint, SineResponse, SineStream
 from actuator.simulation.many import run_many
 from actuator.system.hybrid import HybridSystem
@@ -181,7 +182,7 @@ def frequency_response(  # noqa: PLR0913 - an experiment has this many choices, 
     )
     for changes in sets.values():
         stream.system.parameter_values(changes)
-    _ = stream.machine  # built and compiled once, before there are processes
+    model(stream.system)  # compiled once, before there are processes
     base = dict(inputs or {})
     points: dict[tuple, SinePoint] = {}
     # the slowest first, so that no core is left with them

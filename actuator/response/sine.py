@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 
 from actuator.actuator import Actuator
-from actuator.simulation.engine import Engine, engine
+from actuator.engine.model import model
 from actuator.simulation.failures import SimulationError
 from actuator.simulation.fourier import fourier_coefficients
-from actuator.simulation.prepared import EngineOptions
 from actuator.simulation.signals import Constant, Signal, Sine, piece_at
-from actuator.simulation.window_points import join
+from actuator.simulation.simulate import output_times, resume, settle
 from actuator.stiction.standstill import find_rest, mean_state, slowest_constant, soak_nodes
 from actuator.system.contact_modes import BACKWARD, FORWARD, find_standstill, label_rows
 from actuator.system.hybrid import HybridSystem
@@ -149,11 +148,6 @@ class SineStream:
             laws = (getattr(self.plant, name) for name in LAWS)
             text = repr([self.plant.clocks, *(law and law.serialize() for law in laws)])
         return hashlib.sha256(text.encode()).hexdigest()
-
-    @cached_property
-    def machine(self) -> Engine:
-        """The engine that runs it."""
-        return engine(self.system, EngineOptions(tolerance=self.tolerance, compiled=self.compiled, waves=1))
 
     @cached_property
     def _rows(self) -> list[int]:
@@ -309,24 +303,26 @@ class _Stream:
         self.p = system.parameter_values(point.parameters)
         x, m, _ = stream.start(point)
         u = np.array([piece_at(signal, 0.0)(0.0) for signal in self.signals])
-        self.x, self.m = stream.machine.settle(0.0, x, m, u, self.p)
+        self.x, self.m = settle(system, 0.0, x, m, u, self.p)
 
     def block(self, periods: int) -> _Block:
         """The next periods, analyzed."""
         stream, frequency = self.stream, self.point.frequency
         start, end = self.periods / frequency, (self.periods + periods) / frequency
         pieces = [piece_at(signal, start) for signal in self.signals]
-        windows = list(stream.machine.advance(start, end, self.x, self.m, self.p, pieces, 1 / (POINTS * frequency)))
-        window = join(windows)
-        self.x, self.m = windows[-1].end
+        times = output_times([start, end], 1 / (POINTS * frequency), stream.system.tick_period(self.p))
+        trace = resume(stream.system, start, end, self.x, self.m, pieces, self.p, times, stream.tolerance)
+        self.x, self.m = trace.end
         self.periods += periods
-        values = window.outputs[stream._rows]
-        labels = label_rows(stream.system, np.round(window.modes))
+        inputs = np.column_stack([np.broadcast_to(piece(times - start), times.shape) for piece in pieces])
+        seen = model(stream.system).along("outputs", trace.states, trace.modes, inputs, self.p)
+        values = seen[:, stream._rows].T
+        labels = label_rows(stream.system, trace.modes.T)
         slides = [np.isin(row, (FORWARD, BACKWARD)).any() for row in labels.values()]
-        weights = np.gradient(window.time)
+        weights = np.gradient(times)
         return _Block(
             # the input is a cosine: its phase is that of time
-            amplitudes=fourier_coefficients(window.time, values, frequency, stream.harmonics),
+            amplitudes=fourier_coefficients(times, values, frequency, stream.harmonics),
             swing=np.ptp(values, axis=1),
             slides=any(slides) or not slides,
             stuck=float(weights[find_standstill(labels)].sum() / weights.sum()) if labels else 0.0,

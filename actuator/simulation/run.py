@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -15,7 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from actuator.simulation.signals import Signal
-    from actuator.simulation.window_points import Window
 
 
 class ModeChange(NamedTuple):
@@ -33,8 +33,18 @@ class Statistics(NamedTuple):
     wall_s: float
     simulated_s: float
     events: int  # instants at which modes were decided
-    settled: int  # events the integrator missed and the check after it found
-    compiled: bool
+    settled: int  # decisions that had to be taken again at once
+    compiled: bool = True  # False where NUMBA_DISABLE_JIT is set
+
+
+class Events(NamedTuple):
+    """Every instant at which modes were decided, in order of time; in rows, of states all, the held ones too."""
+
+    times: np.ndarray  # (k,) s
+    fired: np.ndarray  # (k,) index of the margin that fell through zero, -1 at a tick or a break of an input
+    before: np.ndarray  # (k, nx) states
+    after: np.ndarray  # (k, nx)
+    modes: np.ndarray  # (k, nm) after it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +54,7 @@ class Run:
     Attributes
     ----------
     t : ndarray, (n,)
-        Time [s]; piecewise uniform, denser where events crowd.
+        Time [s]; piecewise uniform. At an event, a tick or a break of an input it is what comes after that counts.
     signals : dict of str to ndarray, (n,)
         Inputs, states and outputs.
     units : dict of str to str
@@ -57,6 +67,8 @@ class Run:
         Of the contacts, dimensionless; never negative beyond rounding.
     statistics : Statistics
         Times and counts.
+    events : Events or None
+        With states before and after each; None for a run that no engine made.
     """
 
     system: HybridSystem = field(repr=False)
@@ -69,51 +81,12 @@ class Run:
     margins: np.ndarray = field(repr=False)
     parameters: np.ndarray = field(repr=False)
     statistics: Statistics
+    events: Events | None = field(default=None, repr=False)
 
     def __getitem__(self, name: str) -> np.ndarray:
         """A signal by name; KeyError with the nearest names where there is none."""
         require_known([name], self.signals, "signal")
         return self.signals[name]
-
-    @classmethod
-    def from_window(
-        cls,
-        system: HybridSystem,
-        window: "Window",
-        statistics: Statistics,
-        parameters: np.ndarray,
-        inputs: Sequence["Signal"],
-    ) -> "Run":
-        """Name what the engine returned."""
-        from actuator.simulation.signals import values_at
-
-        signals = {
-            quantity.name: values_at(signal, window.time)
-            for quantity, signal in zip(system.inputs, inputs, strict=True)
-        }
-        signals |= {quantity.name: row for quantity, row in zip(system.states, window.states, strict=True)}
-        signals |= {quantity.name: row for quantity, row in zip(system.outputs, window.outputs, strict=True)}
-        named = [*system.inputs, *system.states, *system.outputs]
-        before = contact_labels(system, window.modes[:, 0])
-        changes = []
-        for time, values in window.events:
-            after = contact_labels(system, values)
-            changes += [
-                ModeChange(time, name, before[name], mode) for name, mode in after.items() if mode != before[name]
-            ]
-            before = after
-        return cls(
-            system=system,
-            t=window.time,
-            signals=signals,
-            units={quantity.name: quantity.unit for quantity in named},
-            modes=label_rows(system, window.modes),
-            mode_values=window.modes,
-            changes=tuple(changes),
-            margins=window.margins,
-            parameters=parameters,
-            statistics=statistics,
-        )
 
     def state(self, index: int = -1) -> dict[str, float]:
         """The states at an output point by name, to start another run from."""
@@ -148,4 +121,76 @@ class Run:
             variables,
             coords={"time": ("time", self.t, {"units": "s"})},
             attrs={"system": self.system.name, **self.statistics._asdict()},
+        )
+
+
+class SimulatedRun(Run):
+    """A run as the engine leaves it; what is derived of it is worked out when it is first asked for."""
+
+    def __init__(  # noqa: PLR0913 - all there is of a run
+        self,
+        *,
+        system: HybridSystem,
+        t: np.ndarray,
+        states: np.ndarray,
+        mode_values: np.ndarray,
+        events: Events,
+        parameters: np.ndarray,
+        inputs: tuple["Signal", ...],
+        statistics: Statistics,
+    ) -> None:
+        given = {name: value for name, value in locals().items() if name not in ("self", "__class__")}
+        self.__dict__.update(given)  # frozen
+
+    @cached_property
+    def signals(self) -> dict[str, np.ndarray]:
+        """Inputs, states and outputs by name, each (n,)."""
+        system = self.system
+        values = [*self._inputs.T, *self.__dict__["states"], *self._observed("outputs").T]
+        return {q.name: row for q, row in zip((*system.inputs, *system.states, *system.outputs), values, strict=True)}
+
+    @cached_property
+    def units(self) -> dict[str, str]:
+        """Unit of each signal."""
+        return {q.name: q.unit for q in (*self.system.inputs, *self.system.states, *self.system.outputs)}
+
+    @cached_property
+    def modes(self) -> dict[str, np.ndarray]:
+        """Per contact: "stuck", "forward", "backward", "free", each (n,)."""
+        return label_rows(self.system, self.mode_values)
+
+    @cached_property
+    def margins(self) -> np.ndarray:
+        """Of the contacts, dimensionless, (margins, n); never negative beyond rounding."""
+        return self._observed("margins").T
+
+    @cached_property
+    def changes(self) -> tuple[ModeChange, ...]:
+        """Contacts going over from one mode to another, in order of time."""
+        events: Events = self.__dict__["events"]
+        before = contact_labels(self.system, self.mode_values[:, 0])
+        found = []
+        for time, values in zip(events.times, events.modes, strict=True):
+            after = contact_labels(self.system, values)
+            found += [
+                ModeChange(float(time), name, before[name], mode)
+                for name, mode in after.items()
+                if mode != before[name]
+            ]
+            before = after
+        return tuple(found)
+
+    @cached_property
+    def _inputs(self) -> np.ndarray:
+        """Values of the inputs, (n, inputs)."""
+        from actuator.simulation.signals import values_at
+
+        columns = [values_at(signal, self.t) for signal in self.__dict__["inputs"]]
+        return np.column_stack(columns) if columns else np.empty((self.t.size, 0))
+
+    def _observed(self, what: str) -> np.ndarray:
+        from actuator.engine.model import model
+
+        return model(self.system).along(
+            what, self.__dict__["states"].T, self.mode_values.T, self._inputs, self.parameters
         )

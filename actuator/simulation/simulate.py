@@ -3,23 +3,25 @@
 import math
 import numbers
 import time as clock
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 
 from actuator.actuator import Actuator
-from actuator.simulation.engine import engine
-from actuator.simulation.prepared import EngineOptions
-from actuator.simulation.run import Run, Statistics
-from actuator.simulation.signals import Constant, Signal, bounds, break_points, piece_at
-from actuator.simulation.window import INTERVALS
-from actuator.simulation.window_points import Window, join
+from actuator.engine.advance import DONE, ON_TIME
+from actuator.engine.engine import Trace, engine
+from actuator.engine.memory import COMPILED
+from actuator.simulation.failures import explain_inconsistent_modes, explain_stop
+from actuator.simulation.run import Events, Run, SimulatedRun, Statistics
+from actuator.simulation.signals import Constant, Piece, Signal, bounds, break_points, piece_at
 from actuator.system.compatibility import require_within_stops
 from actuator.system.hybrid import HybridSystem
 from actuator.system.parameters import with_values
 from gear.quantities import require_known
 
 DEFAULT_POINTS = 2000
+INTERVALS = 200  # between two breaks of the inputs, at least
 ALMOST = 1 - 1e-12  # a ratio that is whole but for rounding
 MOST_TICKS = 20  # between two output points
 
@@ -56,9 +58,9 @@ def simulate(  # noqa: PLR0913 - a simulation has this many choices, all but two
     tolerance : float
         Local error of each state over its nominal size.
     compiled : bool or None
-        True and False insist on compiled and interpreted; None compiles where a C compiler is present.
+        Without effect: every run is compiled.
     progress : callable or None
-        Called with the simulated time [s] after every window.
+        Called with the simulated time [s] several times a second.
 
     Returns
     -------
@@ -83,45 +85,106 @@ def simulate(  # noqa: PLR0913 - a simulation has this many choices, all but two
     if isinstance(plant, Actuator) and plant.gear.stops and "reference" in (inputs or {}):
         reference = signals[[quantity.name for quantity in system.inputs].index("reference")]
         require_within_stops(with_values(plant.gear, "gear", parameters or {}), *bounds(reference, duration))
-    waves = {(wave.frequency, wave.rate) for signal in signals for _, piece in signal.pieces() for wave in piece.waves}
     p = system.parameter_values(parameters)
     x = system.state_vector(start, p)
-    period = system.tick_period(p)
-    fine, stride = (
-        (1, 1) if math.isinf(period) else (math.ceil(period / resolution * ALMOST), int(resolution / period / ALMOST))
-    )
-    options = EngineOptions(
-        tolerance=tolerance,
-        compiled=compiled,
-        waves=len(waves),
-        fine=min(max(fine, 1), INTERVALS),
-        stride=min(max(stride, 1), MOST_TICKS),
-    )
-    machine = engine(system, options)
-
+    machine = engine(system)
     began = clock.perf_counter()
-    stops = sorted(
-        {time for signal in signals for time in break_points(signal) if 0 < time < duration} | {0.0, duration}
+    breaks = {time for signal in signals for time in break_points(signal) if 0 < time < duration}
+    stops = [0.0, *sorted(breaks)]
+    pieces = [(time, [piece_at(signal, time) for signal in signals]) for time in stops]
+    times = output_times([*stops, duration], resolution, system.tick_period(p))
+    trace = machine.run(
+        pieces, duration, x, np.zeros(len(system.modes)), p, times, tolerance=tolerance, progress=progress
     )
-    m = np.zeros(len(system.modes))
-    windows: list[Window] = []
-    for first, last in zip(stops, stops[1:], strict=False):
-        u = np.array([piece_at(signal, first)(0.0) for signal in signals])
-        x, settled = machine.settle(first, x, m, u, p)
-        jump = [(first, tuple(int(mode) for mode in settled))] if first > 0 and not np.array_equal(settled, m) else []
-        m = settled
-        pieces = [piece_at(signal, first) for signal in signals]
-        for window in machine.advance(first, last, x, m, p, pieces, resolution):
-            windows.append(window._replace(events=[*jump, *window.events]))
-            (x, m), jump = window.end, []
-            if progress is not None:
-                progress(window.time[-1])
-    whole = join(windows)
-    wall = clock.perf_counter() - began
     statistics = Statistics(
-        wall_s=wall, simulated_s=duration, events=len(whole.events), settled=whole.settled, compiled=machine.compiled
+        wall_s=clock.perf_counter() - began,
+        simulated_s=trace.time,
+        events=trace.event_times.size,
+        settled=trace.counts["again"],
+        compiled=COMPILED,
     )
-    return Run.from_window(system, whole, statistics, p, signals)
+    run = SimulatedRun(
+        system=system,
+        t=trace.times,
+        states=trace.states.T,
+        mode_values=trace.modes.T,
+        events=Events(trace.event_times, trace.event_fired, trace.event_before, trace.event_after, trace.event_modes),
+        parameters=p,
+        inputs=tuple(signals),
+        statistics=statistics,
+    )
+    if trace.status != DONE:
+        raise explain_stop(system, trace, run)
+    return run
+
+
+def settle(
+    system: HybridSystem, time: float, x: np.ndarray, m: np.ndarray, u: np.ndarray, p: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """State and modes after a consistent decision of all modes from the state alone.
+
+    Raises
+    ------
+    InconsistentModes
+        Where there is none.
+    """
+    state, modes, fault = system.reset(np.zeros(len(system.events)), x, m, u, p)
+    modes = np.round(modes.full().ravel())
+    if float(fault):
+        raise explain_inconsistent_modes(system, time, modes)
+    return state.full().ravel(), modes
+
+
+def resume(  # noqa: PLR0913, PLR0917 - from where to where, and how
+    system: HybridSystem,
+    time: float,
+    end: float,
+    x: np.ndarray,
+    m: np.ndarray,
+    pieces: list[Piece],
+    p: np.ndarray,
+    times: np.ndarray,
+    tolerance: float,
+) -> Trace:
+    """From a state with its modes to another time, inputs in one piece, which begins at `time`.
+
+    Raises
+    ------
+    SimulationError
+        Where it does not get there.
+    """
+    trace = engine(system).run([(time, pieces)], end, x, m, p, times, tolerance=tolerance, settled=True)
+    if trace.status != DONE:
+        raise explain_stop(system, trace)
+    return trace
+
+
+def output_times(stops: Sequence[float], resolution: float, period: float) -> np.ndarray:
+    """Output points, at most a resolution apart: breaks of the inputs and, where there are ticks, only such between."""
+    parts = []
+    for first, last in pairwise(stops):
+        for begin, end, ticks in _stretches(first, last, period):
+            if ticks:
+                fine, stride = math.ceil(period / resolution * ALMOST), int(resolution / period / ALMOST)
+                fine, stride = min(max(fine, 1), INTERVALS), min(max(stride, 1), MOST_TICKS)
+                index = round(begin / period)
+                starts = (index + np.arange(0, ticks, stride)) * period
+                parts.append((starts[:, None] + period * np.arange(fine) / fine).ravel())
+            else:
+                count = INTERVALS * math.ceil((end - begin) / (INTERVALS * resolution) * ALMOST)
+                if not math.isinf(period):
+                    count = math.ceil((end - begin) / resolution * ALMOST)
+                parts.append(begin + (end - begin) * np.arange(count) / count)
+    return np.append(np.concatenate(parts), stops[-1])
+
+
+def _stretches(time: float, end: float, period: float) -> list[tuple[float, float, int]]:
+    """(begin, end, whole periods): up to the first tick, from there to the last one, and the rest."""
+    first, last = (0, -1) if math.isinf(period) else (math.ceil(time / period - ON_TIME), int(end / period + ON_TIME))
+    if first > last:
+        return [(time, end, 0)]
+    found = [(time, first * period, 0), (first * period, last * period, last - first), (last * period, end, 0)]
+    return [stretch for stretch in found if stretch[1] - stretch[0] > ON_TIME * period]
 
 
 def _signals(system: HybridSystem, inputs: Mapping[str, Signal | float]) -> list[Signal]:

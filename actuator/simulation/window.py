@@ -5,7 +5,6 @@ integration, and so on.
 """
 
 import casadi as ca
-import numpy as np
 
 from actuator.simulation.input_form import InputForm
 from actuator.simulation.integration import integration, observed
@@ -14,21 +13,6 @@ from actuator.system.hybrid import HybridSystem
 
 INTERVALS = 200  # output intervals of one window
 VIOLATION = 1e-9  # a margin below minus this is a missed event, not rounding
-
-
-def window_function(system: HybridSystem, form: InputForm, code: ModeCode, tolerance: float) -> ca.Function:
-    """(x, m, p, length, coefficients) -> states, modes, outputs, margins, log.
-
-    All results have a column per output point, the first for the start. The log has the number of events so far, the
-    times of the last LOG_SLOTS of them as parts of the window, newest first (-1 minus the time where no consistent
-    modes were found), and the codes of the modes after them.
-    """
-    pieces = integration(system, form, code, tolerance, INTERVALS)
-    x, m, p, length, wave = _window_inputs(system, form)
-    path = pieces.between(x, m, p, pieces.derived(p), length, 0, wave)
-    times = length * ca.DM(np.linspace(0, 1, INTERVALS + 1)).T
-    seen = observed(pieces, times, path, x[system.moving :, :], p, wave)
-    return ca.Function("window", [x, m, p, length, wave], [*seen, pieces.log.told(path)])
 
 
 def ticks_function(  # noqa: PLR0913 - how finely and how often

@@ -7,16 +7,14 @@ from typing import NamedTuple
 import numpy as np
 
 from actuator.actuator import Actuator
-from actuator.orbits.flow import FlowMap, NoOrbit, flow_map
-from actuator.orbits.segments import cut_motion
-from actuator.simulation.engine import engine
-from actuator.simulation.prepared import EngineOptions
 from actuator.simulation.signals import Piece
+from actuator.simulation.simulate import resume, settle
 from actuator.system.contact_modes import STUCK, contact_labels, is_at_rest
 from actuator.system.hybrid import EventKind, HybridSystem, require_sticking
 from gear.quantities.roles import ShaftSpeed
 
 STILL_RATE = 1e-6  # rate of a state over its nominal size [1/s] that does not count as moving
+TOLERANCE = 1e-9  # of the motion up to breakaway
 PERMANENT = 1e4  # s, after which a standstill is called so
 
 
@@ -83,15 +81,14 @@ def predict_breakaway(
     system = plant.system() if isinstance(plant, Actuator) else plant
     require_sticking(system, "predict_breakaway")
     x, u, p = system.state_vector(state), system.input_vector(inputs), system.parameter_values(parameters)
-    x, m = engine(system, EngineOptions(compiled=compiled)).settle(0.0, x, np.zeros(len(system.modes)), u, p)
+    x, m = settle(system, 0.0, x, np.zeros(len(system.modes)), u, p)
     labels = contact_labels(system, m)
     moving = [] if is_at_rest(list(labels.values())) else [f"{name} is {label}" for name, label in labels.items()]
     if not moving:  # what no contact holds may hang in a gap
         moving = find_unsupported(system, x, m, u, p)
     if moving or not labels:
         raise NotAtRest(f"{system.name}: stiction does not hold this state: {', '.join(moving) or 'nothing sticks'}")
-    machine = flow_map(system, compiled=compiled)
-    time, name = _drift(machine, x, machine.integer_modes(m), u, p)
+    time, name = _drift(system, x, m, u, p)
     return BreakawayPrediction(
         system=system,
         holds=_holds(system, x, m, u, p),
@@ -129,29 +126,16 @@ def _error(system: HybridSystem, x: np.ndarray, m: np.ndarray, u: np.ndarray, p:
     return float(system.outputs_function(x, m, u, p)[names.index("position_error")])
 
 
-def _drift(machine: FlowMap, x: np.ndarray, m: tuple[int, ...], u: np.ndarray, p: np.ndarray) -> tuple[float, str]:
+def _drift(system: HybridSystem, x: np.ndarray, m: np.ndarray, u: np.ndarray, p: np.ndarray) -> tuple[float, str]:
     """Time to breakaway and its event; infinite, "" where the controller comes to rest first."""
     length, passed = 1.0, 0.0
+    nominal, pieces = np.array([state.nominal for state in system.states]), [Piece(float(value)) for value in u]
     while passed < PERMANENT:
-        if (abs(machine.rate(x, m, u, p)) < STILL_RATE * machine.nominal).all():
+        if (abs(system.flow(x, m, u, p).full().ravel()) < STILL_RATE * nominal).all():
             return float("inf"), ""
-        window = engine(machine.system, EngineOptions(tolerance=1e-9, compiled=machine.compiled)).run(
-            0.0, length, x, np.array(m, float), p, [Piece(float(value)) for value in u]
-        )
-        for time, after in window.events:
-            if not is_at_rest(list(contact_labels(machine.system, after).values())):
-                return _exactly(machine, x, m, u, p, float(time), passed)
-        x, m, passed, length = window.end[0], machine.integer_modes(window.end[1]), passed + length, 2 * length
+        trace = resume(system, 0.0, length, x, m, pieces, p, np.array([length]), TOLERANCE)
+        for time, fired, after in zip(trace.event_times, trace.event_fired, trace.event_modes, strict=True):
+            if not is_at_rest(list(contact_labels(system, after).values())):
+                return passed + float(time), system.events[fired].name
+        (x, m), passed, length = trace.end, passed + length, 2 * length
     return float("inf"), ""
-
-
-def _exactly(
-    machine: FlowMap, x: np.ndarray, m: tuple[int, ...], u: np.ndarray, p: np.ndarray, guess: float, passed: float
-) -> tuple[float, str]:
-    """The breakaway near `guess`, from the margins themselves."""
-    pieces, _ = cut_motion(machine, x, m, u, p, guess * (1 + 1e-3) + 1e-6)
-    for piece in pieces:
-        passed += piece.duration
-        if piece.fired < machine.events and machine.system.events[piece.fired].kind is EventKind.FRICTION:
-            return passed, machine.names[piece.fired]
-    raise NoOrbit(f"{machine.system.name}: the end of the standstill at {passed + guess:.9g} s was not found again")

@@ -150,7 +150,7 @@ class _Assembly:
         inertia[gear.output] += parts["load"].inertia_at(motion.load_angle)
         creeping = actuator.gear.laws_with_memory()
         memory = {path: [ca.SX.sym(f"gear.{path}.{k.name}") for k in law.memory()] for path, law in creeping.items()}
-        contacts = ContactMechanics(gear, actuator.gear.redundant(), kinematics, inertia, memory)
+        contacts = ContactMechanics(gear, actuator.gear, kinematics, inertia, memory)
 
         names = () if actuator.controller is None else actuator.controller.loops()
         loops, due = build_loops(builder, names, parts["sampling"], actuator.sampling)
@@ -230,7 +230,7 @@ class _Assembly:
 def _whole_reset(settle: ca.Function, arguments: list[ca.SX], states: list[str], speeds: list[ca.SX]) -> ca.Function:
     """Reset of the mechanics, everything else unchanged."""
     inputs = [ca.MX.sym(f"input{i}", settle.size1_in(i)) for i in range(1 + len(arguments))]
-    after, modes, fault = settle(*inputs)
+    after, modes, fault = settle.call(inputs, True, False)  # inline: the decision has no derivative, the rest has
     x, first = inputs[1], states.index(speeds[0].name())
     return ca.Function("reset", inputs, [ca.vertcat(x[:first, :], after, x[first + len(speeds) :, :]), modes, fault])
 

@@ -53,12 +53,13 @@ class Kinematics:
         """Motion of every shaft from that of the independent ones."""
         return {s: sum((turn * motion[q] for q, turn in row.items()), 0.0) for s, row in self.turns.items()}
 
-    def _gather(self, torque: Mapping[str, Scalar]) -> list[Scalar]:
-        """Generalized torques on the independent shafts."""
-        return [
-            sum((self.turns[s].get(q, 0.0) * value for s, value in torque.items() if q in self.turns[s]), 0.0)
-            for q in self.independent
-        ]
+    def gather(self, torque: Mapping[str, Scalar]) -> Row:
+        """Generalized torque on each independent shaft, of torques on shafts; of a row of coefficients, likewise."""
+        found: Row = {}
+        for shaft, value in torque.items():
+            for q, turn in self.turns[shaft].items():
+                found[q] = found.get(q, 0.0) + turn * value
+        return found
 
     def solver(self, inertia: Mapping[str, Scalar]) -> "Inertia":
         """The inertia behind the independent shafts, factorized once."""
@@ -76,12 +77,13 @@ class Inertia:
     """Accelerations from torques: M^-1 of the independent shafts, seen from all."""
 
     def __init__(self, kinematics: Kinematics, rows: list[list[Matrix]]) -> None:
-        self.kinematics = kinematics
+        self.kinematics, self.rows = kinematics, rows
         self.factors = factorize(rows)
 
     def accelerations(self, torque: Mapping[str, Scalar]) -> dict[str, Scalar]:
         """Acceleration of every shaft [rad/s^2] from the torques on the shafts [N m]; impulses give speed steps."""
-        solved = substitute(*self.factors, self.kinematics._gather(torque))
+        known = self.kinematics.gather(torque)
+        solved = substitute(*self.factors, [known.get(q, 0.0) for q in self.kinematics.independent])
         return self.kinematics.expand(dict(zip(self.kinematics.independent, solved, strict=True)))
 
 

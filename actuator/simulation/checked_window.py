@@ -68,6 +68,7 @@ def _settled(machine: Prepared, window: Window, k: int, p: np.ndarray, pieces: l
     u = np.array([piece(time - window.time[0]) for piece in pieces])
     state, modes = machine.settle(time, x, m, u, p)
     if np.array_equal(modes, m):
-        raise explain_inconsistent_modes(machine.system, time, modes)
+        margins = machine.system.margins(state, modes, u, p).full().ravel()
+        raise explain_inconsistent_modes(machine.system, time, modes, margins)
     head = window.until(k)._replace(events=[*window.events, (time, tuple(int(mode) for mode in modes))], settled=1)
     return join([head, part(time, window.time[-1], state, modes)])

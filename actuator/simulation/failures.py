@@ -38,13 +38,18 @@ def explain_stop(
 
 
 def explain_inconsistent_modes(
-    system: HybridSystem, time: float, modes: Sequence[float] | np.ndarray
+    system: HybridSystem, time: float, modes: Sequence[float] | np.ndarray, margins: np.ndarray | None = None
 ) -> InconsistentModes:
-    """The decision of the modes failed at a time; `modes` are those it tried last."""
+    """The decision of the modes failed at a time; `modes` are those it came to, and `margins` say what they break."""
     named = {name: int(mode) for name, mode in zip(system.modes, modes, strict=True)}
+    why = "the decision for the contacts at rest did not end"
+    if margins is not None and margins.min() < 0:
+        broken = zip(system.margin_names, margins, strict=True)
+        why = (
+            f"broken are {', '.join(f'{name} ({margin:.3g} of a usual size)' for name, margin in broken if margin < 0)}"
+        )
     return InconsistentModes(
-        f"{system.name}: no consistent contact modes at t = {time:.9g} s; last candidate {_describe(named)}; "
-        "check for self-locking",
+        f"{system.name}: no consistent contact modes at t = {time:.9g} s: {why}; last candidate {_describe(named)}",
         time,
         named,
     )

@@ -92,7 +92,8 @@ class Prepared:
         state, modes, fault = self.system.reset(np.zeros(len(self.system.margin_names)), x, m, u, p)
         modes = np.round(modes.full().ravel())
         if float(fault):
-            raise explain_inconsistent_modes(self.system, time, modes)
+            margins = self.system.margins(state, modes, u, p).full().ravel()
+            raise explain_inconsistent_modes(self.system, time, modes, margins)
         return state.full().ravel(), modes
 
     def logged(
@@ -102,9 +103,9 @@ class Prepared:
         found = []
         for tau, packed in reversed(list(zip(times, codes.reshape(-1, self.code.size), strict=False))):
             modes = self.code.words(packed)
-            if tau < 0:  # a fault, with its time below minus one
+            if tau < -0.5:  # a fault, with its time below minus one  # noqa: PLR2004
                 raise explain_inconsistent_modes(self.system, time + length * (-1 - tau), np.array(modes))
-            found.append((time + length * tau, modes))
+            found.append((time + length * max(tau, 0.0), modes))  # located by the interpolant, a little early
         return found
 
 

@@ -13,7 +13,7 @@ from actuator.simulation.engine import engine
 from actuator.simulation.prepared import EngineOptions
 from actuator.simulation.signals import Piece
 from actuator.system.contact_modes import STUCK, contact_labels, is_at_rest
-from actuator.system.hybrid import EventKind, HybridSystem, require_sticking
+from actuator.system.hybrid import INACTIVE, MARGIN_BAND, EventKind, HybridSystem, require_sticking
 from gear.quantities.roles import ShaftSpeed
 
 STILL_RATE = 1e-6  # rate of a state over its nominal size [1/s] that does not count as moving
@@ -25,7 +25,7 @@ class NotAtRest(ValueError):
 
 
 class Hold(NamedTuple):
-    """How far a contact is from breaking away."""
+    """How far a contact is from breaking away, alone or with the group that holds with it."""
 
     margin: float  # smaller of static - s and static + s, over its usual force or torque
     reserve: float  # the same, over the friction limit: 1 unloaded, 0 at breakaway
@@ -113,13 +113,18 @@ def find_unsupported(system: HybridSystem, x: np.ndarray, m: np.ndarray, u: np.n
 
 def _holds(system: HybridSystem, x: np.ndarray, m: np.ndarray, u: np.ndarray, p: np.ndarray) -> dict[str, Hold]:
     margins = zip(system.events, system.margins(x, m, u, p).full().ravel(), strict=True)
-    sides = {(event.at, event.side): margin for event, margin in margins if event.kind is EventKind.FRICTION}
-    found = {}
-    for name in (name for name, label in contact_labels(system, m).items() if label == STUCK):
-        upper, lower = sides[name, 1], sides[name, -1]
-        # (static - s) and (static + s) over the same size: their mean is the limit
-        found[name] = Hold(float(min(upper, lower)), float(2 * min(upper, lower) / (upper + lower)))
-    return found
+    sides = {(event.contacts, event.side): margin for event, margin in margins if event.kind is EventKind.FRICTION}
+    found: dict[str, Hold] = {}
+    stuck = {name for name, label in contact_labels(system, m).items() if label == STUCK}
+    for contacts in {contacts for contacts, _ in sides}:
+        upper, lower = sides[contacts, 1], sides[contacts, -1]
+        if upper == lower == INACTIVE + MARGIN_BAND:
+            continue
+        # (limit - load) and (limit + load) over the same size: their mean is the limit
+        hold = Hold(float(min(upper, lower)), float(2 * min(upper, lower) / (upper + lower)))
+        for name in stuck & set(contacts):  # a contact lets go with the first group that does
+            found[name] = min(found.get(name, hold), hold, key=lambda one: one.reserve)
+    return {name: found[name] for name in contact_labels(system, m) if name in found}
 
 
 def _error(system: HybridSystem, x: np.ndarray, m: np.ndarray, u: np.ndarray, p: np.ndarray) -> float:

@@ -11,7 +11,7 @@ from actuator.system.hybrid import HybridSystem
 
 STUCK, FORWARD, BACKWARD, FREE = "stuck", "forward", "backward", "free"
 MOTIONS = {STUCK: 0, FORWARD: 1, BACKWARD: -1}  # of a contact that is not in its gap
-LABELS = {0: STUCK, 1: FORWARD, -1: BACKWARD, 2: STUCK, -2: STUCK}  # +-2: stuck at its limit, held by others
+LABELS = {0: STUCK, 1: FORWARD, -1: BACKWARD}
 
 
 def contact_labels(system: HybridSystem, values: Sequence[float] | np.ndarray) -> dict[str, str]:
@@ -26,10 +26,10 @@ def contact_labels(system: HybridSystem, values: Sequence[float] | np.ndarray) -
 def label_rows(system: HybridSystem, values: np.ndarray) -> dict[str, np.ndarray]:
     """Modes of each contact in words, from rows of the mode variables."""
     rows = dict(zip(system.modes, values, strict=True))
-    table = np.array([LABELS[k] for k in (-2, -1, 0, 1, 2)])
+    table = np.array([LABELS[k] for k in (-1, 0, 1)])
     found = {}
     for contact in system.contacts:
-        labels = table[rows[contact.motion].astype(int) + 2]
+        labels = table[rows[contact.motion].astype(int) + 1]
         found[contact.name] = np.where(rows[contact.flank] == 0, FREE, labels) if contact.flank else labels
     return found
 

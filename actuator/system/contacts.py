@@ -5,24 +5,27 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from actuator.system.hybrid import MARGIN_BAND, Event, EventKind, Mode, ModeKind, Place
+from actuator.system.decision import decision_function
+from actuator.system.hybrid import INACTIVE, MARGIN_BAND, Event, EventKind, Mode, ModeKind, Place
 from actuator.system.hybrid import Contact as ContactRecord
 from gear.couplings.law import TWIST_NOMINAL, Twist
 from gear.elasticity.law import DEFLECTION_NOMINAL, has_gap
-from gear.kinematics import Kinematics
+from gear.kinematics import Kinematics, Row
 from gear.motion import MeshMotion
-from gear.quantities import Scalar
-from gear.stiction import AT_LIMIT, BACKWARD, FORWARD, Matrix, RestProblem, decide, friction
+from gear.quantities import Matrix, Scalar
+from gear.stiction.decision import BACKWARD, FORWARD, RestProblem
+from gear.stiction.friction import friction, motion_without_slip, smallest_sharing
+from gear.stiction.mechanisms import mechanisms, structural_rank
 from gear.transmission import Contact, Transmission
 
 REST_SPEED = 10 * MARGIN_BAND  # part of a contact's usual slip speed that counts as standing still
-INACTIVE = 1.0  # value of a margin that means nothing in the present mode
+SHARED = {"cse": True}
 
 
 class ContactModes(NamedTuple):
     """The mode variables of a transmission."""
 
-    motion: ca.SX  # (K, 1): 0 stuck, +-1 sliding, +-2 stuck at the limit
+    motion: ca.SX  # (K, 1): 0 stuck, +-1 sliding
     flank: dict[str, ca.SX]  # per mesh, coupling and end stop, by path: +1, -1, 0 in the gap
 
 
@@ -36,9 +39,8 @@ class ContactForces(NamedTuple):
     slip: Matrix  # slip speed
     static: Matrix  # friction limit at rest
     sliding: Matrix  # friction while sliding at the present speed
-    compliance: Matrix  # G of the joint decision
-    demand: Matrix  # slip acceleration without contact friction
-    friction: Matrix  # the friction scalars of the present modes
+    friction: Matrix  # friction scalars of the present modes, some of those that hold where they are not unique
+    shown: Matrix  # the smallest of those
     smooth: dict[str, Matrix]  # torque per shaft of teeth, couplings, stops and viscous drag [N m]
     by_memory: dict[str, tuple[Matrix, list[Matrix]]]  # per law that does not stick, by path: friction scalar, rates
     acceleration: dict[str, Matrix]  # per shaft [rad/s^2]
@@ -51,8 +53,8 @@ class ContactMechanics:
     ----------
     gear : Transmission
         Symbolic (its numbers are parameters).
-    redundant : bool
-        Whether several contacts can lock the same shafts.
+    numbers : Transmission
+        The same in numbers, which decide what is redundant.
     kinematics : Kinematics
         Which shafts move independently.
     inertia : mapping of str to SX
@@ -65,15 +67,24 @@ class ContactMechanics:
     def __init__(
         self,
         gear: Transmission,
-        redundant: bool,
+        numbers: Transmission,
         kinematics: Kinematics,
         inertia: Mapping[str, Scalar],
         memory: Mapping[str, list[ca.SX]],
     ) -> None:
-        self.gear, self.redundant, self.kinematics = gear, redundant, kinematics
+        self.gear, self.redundant, self.kinematics = gear, numbers.redundant(), kinematics
         self.masses, self.inertia = inertia, kinematics.solver(inertia)
         self.contacts: list[Contact] = gear.contacts()
         self.creeping, self.memory = gear.contacts(sticking=False), memory
+        # rows over the independent shafts: slip speed, and torque against the shafts per unit of friction
+        self.slip = [kinematics.gather(contact.slip) for contact in self.contacts]
+        self.torque = [kinematics.gather(opposed(contact)) for contact in self.contacts]
+        in_numbers = numbers.kinematics()
+        rows = [in_numbers.gather(opposed(contact)) for contact in numbers.contacts()]
+        self.rank = structural_rank(rows, in_numbers.independent)
+        found = mechanisms(self.torque, rows, in_numbers.independent)
+        self.alone = {k for slips in found if len(slips) == 1 for k in slips}  # contacts that can let go by themselves
+        self.groups = [slips for slips in found if len(slips) > 1]  # contacts that let go together
         # without a gap the flank only matters to friction, where the size of the normal force has a kink
         laws = {name: mesh.law() for name, mesh in gear.meshes.items() if not mesh.rigid}
         self.laws = {
@@ -115,7 +126,7 @@ class ContactMechanics:
     @staticmethod
     def state(forces: ContactForces) -> list[Matrix]:
         """Slip speed, friction, and friction limit at rest and while sliding, of all contacts."""
-        return [forces.slip, forces.friction, forces.static, forces.sliding]
+        return [forces.slip, forces.shown, forces.static, forces.sliding]
 
     def modes(self, m: ca.SX) -> ContactModes:
         """The mode variables from the vector m; rounding is taken off here, once."""
@@ -147,14 +158,16 @@ class ContactMechanics:
         outside = {shaft: torque.get(shaft, 0) + rubbing.get(shaft, 0) for shaft in smooth}
         free = self.inertia.accelerations({shaft: value + outside[shaft] for shaft, value in smooth.items()})
         demand = ca.vertcat(*(sum(c * free[shaft] for shaft, c in contact.slip.items()) for contact in self.contacts))
-        compliance = self.compliance()
         static, sliding = self.limits(motions, normal, direction * slip, direction, modes)
-        at_limit = ca.eq(ca.fabs(modes.motion), AT_LIMIT)
-        given = direction * ca.if_else(at_limit, static, sliding)
         held = ca.eq(direction, 0) * self._engaged(modes)
-        scalar = friction(compliance, demand, held, given, self.redundant)
+        scalar = friction(self.compliance(), demand, held, direction * sliding, self.redundant)
         answer = self.inertia.accelerations(self.friction_torques(scalar))
-        acceleration = {shaft: free[shaft] + answer[shaft] for shaft in self.gear.shafts}
+        acceleration = self.without_slip({shaft: free[shaft] + answer[shaft] for shaft in self.gear.shafts}, held)
+        shown = scalar
+        if self.groups:
+            torque = _matrix(self.torque, self.kinematics.independent)
+            spare = len(self.contacts) - self.rank
+            shown = smallest_sharing(torque, scalar, held, static, spare)
         return ContactForces(
             motions=motions,
             normal=normal,
@@ -163,13 +176,18 @@ class ContactMechanics:
             slip=slip,
             static=static,
             sliding=sliding,
-            compliance=compliance,
-            demand=demand,
             friction=scalar,
+            shown=shown,
             smooth=smooth,
             by_memory=by_memory,
             acceleration=acceleration,
         )
+
+    def without_slip(self, motion: Mapping[str, Scalar], held: Matrix) -> dict[str, Scalar]:
+        """The motion of the shafts with what is left of slip in the held contacts taken out, by construction."""
+        shafts = self.kinematics.independent
+        taken = motion_without_slip(self.slip, held, shafts) @ ca.vertcat(*(ca.SX(motion[shaft]) for shaft in shafts))
+        return self.kinematics.expand(dict(zip(shafts, ca.vertsplit(taken), strict=True)))
 
     def compliance(self) -> Matrix:
         """G of the joint decision: slip acceleration of contact i per unit of friction against it in contact k."""
@@ -238,12 +256,15 @@ class ContactMechanics:
     # -- margins --------------------------------------------------------------------------------------
 
     def events(self) -> list[Event]:
-        """Two per contact, two per mesh, coupling or stop with a gap and one per mesh without."""
-        found = [
-            Event(f"gear.{contact.name} {end}", EventKind.FRICTION, f"gear.{contact.name}", Place(contact.place), side)
-            for contact in self.contacts
-            for end, side in (("upper", 1), ("lower", -1))
-        ]
+        """Two per contact and group of contacts, two per mesh, coupling or stop with a gap, one per mesh without."""
+        found = []
+        for slips in [(k,) for k in range(len(self.contacts))] + [tuple(group) for group in self.groups]:
+            names = tuple(f"gear.{self.contacts[k].name}" for k in slips)
+            at, place = " + ".join(names), Place(self.contacts[slips[0]].place)
+            found += [
+                Event(f"{at} {end}", EventKind.FRICTION, at, place, side, names)
+                for end, side in (("upper", 1), ("lower", -1))
+            ]
         for path in self.flanks:
             at, place = f"gear.{path}", self._place(path)
             if path in self.gapped:
@@ -265,19 +286,27 @@ class ContactMechanics:
 
         stuck:    (static - s) and (static + s), over a usual friction force
         sliding:  direction * slip speed, over a usual speed
+        group:    sum of static |c| of what is stuck of it -+ sum of s c, over the usual (see `mechanisms`)
         flank:    flank * F_n without a gap, else the penetration or the distance to the flank
         """
         rows = []
         engaged = self._engaged(modes)
+        stuck = ca.logic_and(ca.eq(modes.motion, 0), engaged)
         for k, contact in enumerate(self.contacts):
-            stuck = ca.logic_and(ca.eq(modes.motion[k], 0), engaged[k])
             slides = ca.logic_and(ca.eq(ca.fabs(modes.motion[k]), 1), engaged[k])
-            speed = modes.motion[k] * forces.slip[k] / contact.speed_nominal
+            speed = ca.if_else(slides, modes.motion[k] * forces.slip[k] / contact.speed_nominal, INACTIVE)
             room = [(forces.static[k] - end * forces.friction[k]) / contact.force_nominal for end in (1, -1)]
+            alone = k in self.alone
             rows += [
-                ca.if_else(stuck, room[0], ca.if_else(slides, speed, INACTIVE)),
-                ca.if_else(stuck, room[1], INACTIVE),
+                ca.if_else(stuck[k], room[0] if alone else INACTIVE, speed),
+                ca.if_else(stuck[k], room[1], INACTIVE) if alone else ca.SX(INACTIVE),
             ]
+        for slips in self.groups:
+            limit = sum(ca.fabs(c) * ca.if_else(stuck[k], forces.static[k], 0) for k, c in slips.items())
+            load = sum(c * ca.if_else(stuck[k], forces.friction[k], 0) for k, c in slips.items())
+            usual = sum(ca.fabs(c) * self.contacts[k].force_nominal for k, c in slips.items())
+            some = sum(stuck[k] for k in slips) > 0
+            rows += [ca.if_else(some, (limit - end * load) / usual, INACTIVE) for end in (1, -1)]
         for path in self.flanks:
             flank = modes.flank[path]
             if path not in self.gapped:
@@ -295,7 +324,7 @@ class ContactMechanics:
     def flanks_after(self, fired: Matrix, angle: Mapping, speed: Mapping, before: Mapping[str, Scalar]) -> list[ca.SX]:
         """Flank of each mesh, coupling and stop after an event; from where it is if the event was elsewhere."""
         motions, twists = self.gear.motions(angle, speed), self.gear.twists(angle, speed)
-        row, found = 2 * len(self.contacts), []
+        row, found = 2 * (len(self.contacts) + len(self.groups)), []
         for path in self.flanks:
             flank = before[path]
             if path not in self.gapped:
@@ -318,30 +347,36 @@ class ContactMechanics:
         self, fired: Matrix, angle: Mapping, speed: Mapping, torque: Mapping, before: Matrix, flank: Mapping
     ) -> RestProblem:
         """What is to be decided jointly after an event: which contacts are at rest, and what they must bear."""
-        slip = self.slip_speeds(speed)
-        direction = ca.sign(slip)
+        slip, shafts, count = self.slip_speeds(speed), self.kinematics.independent, len(self.contacts)
+        direction, still = ca.sign(slip), ca.SX.zeros(count)
         modes = ContactModes(direction, dict(flank))
         forces = self.forces(angle, speed, torque, modes)
-        rest, released = [], []
-        for k, contact in enumerate(self.contacts):
-            hit = ca.logic_or(fired[2 * k], fired[2 * k + 1])
-            was_stuck = ca.eq(before[k], 0)
-            slow = ca.fabs(slip[k]) <= REST_SPEED * contact.speed_nominal
-            rest.append(ca.logic_or(slow, hit))
-            released.append(ca.logic_and(hit, was_stuck))
-        resting = ca.vertcat(*rest) * self._engaged(modes)
-        still = ca.SX.zeros(len(self.contacts))
         onset = [
             self.limits(forces.motions, forces.normal, still, still + end, modes)[1] for end in (FORWARD, BACKWARD)
         ]
+
+        rest, released = [], []
+        for k, contact in enumerate(self.contacts):
+            hit = ca.logic_or(fired[2 * k], fired[2 * k + 1])
+            together = [2 * (count + g) + side for g, slips in enumerate(self.groups) if k in slips for side in (0, 1)]
+            was_stuck = ca.eq(before[k], 0)
+            slow = ca.fabs(slip[k]) <= REST_SPEED * contact.speed_nominal
+            rest.append(ca.logic_or(slow, hit))
+            released.append(ca.logic_and(was_stuck, sum((fired[row] for row in together), hit)))
+        resting = ca.vertcat(*rest) * self._engaged(modes)
+        rubbing = self.friction_torques(ca.if_else(resting, 0, direction * forces.sliding))
+        creep = self.creep_torques(forces.by_memory)
+        outside = {shaft: torque.get(shaft, 0) + creep.get(shaft, 0) for shaft in self.gear.shafts}
+        load = self.kinematics.gather({s: forces.smooth[s] + rubbing[s] + outside[s] for s in self.gear.shafts})
         return RestProblem(
-            compliance=forces.compliance,
-            demand=forces.demand,
+            inertia=ca.vertcat(*(ca.horzcat(*(ca.SX(entry) for entry in row)) for row in self.inertia.rows)),
+            load=ca.vertcat(*(load[shaft] for shaft in shafts)),
+            slip=_matrix(self.slip, shafts),
+            torque=_matrix(self.torque, shafts),
             static=forces.static,
             forward=onset[0],
             backward=onset[1],
             rest=resting,
-            given=direction * forces.sliding,
             released=ca.vertcat(*released),
         )
 
@@ -362,19 +397,31 @@ class ContactMechanics:
         before = self.modes(m)
         flank = self.flanks_after(fired, angle, speed, before.flank)
         problem = self.problem(fired, angle, speed, torque, before.motion, self._all_flanks(flank))
-        impulse = friction(
-            problem.compliance, self.slip_speeds(speed), problem.rest, ca.SX.zeros(len(self.contacts)), self.redundant
-        )
+        slip, count = self.slip_speeds(speed), len(self.contacts)
+        impulse = friction(self.compliance(), slip, problem.rest, ca.SX.zeros(count), self.redundant)
         step = self.inertia.accelerations(self.friction_torques(impulse))
-        speeds = [speed[shaft] + step[shaft] for shaft in self.kinematics.independent]
+        after = self.without_slip({shaft: speed[shaft] + step[shaft] for shaft in self.gear.shafts}, problem.rest)
+        speeds = ca.vertcat(*(after[shaft] for shaft in self.kinematics.independent))
+        posed = ca.vertcat(*(ca.vec(ca.SX(part).T) for part in problem))
         pose = ca.Function(
             f"{name}_pose",
             [fired, *arguments],
-            [*problem, ca.sign(self.slip_speeds(speed)), ca.vertcat(*flank), ca.vertcat(*speeds)],
+            [posed, problem.rest, ca.sign(slip), ca.vertcat(*flank), speeds],
+            SHARED,
         )
         inputs = [ca.MX.sym(f"input{i}", symbol.shape[0]) for i, symbol in enumerate((fired, *arguments))]
-        *posed, direction, flanks, after = pose(*inputs)
-        posed = RestProblem(*posed)
-        decision = decide(posed, self.redundant)
-        motion = ca.if_else(posed.rest, decision.motion, direction)
-        return ca.Function(name, inputs, [after, ca.vertcat(motion, flanks), decision.fault])
+        posed, rest, direction, flanks, after = pose(*inputs)
+        if not count:
+            return ca.Function(name, inputs, [after, flanks, 0])
+        decided = decision_function(len(self.kinematics.independent), count)(posed)
+        motion = ca.if_else(rest, decided[:count], direction)
+        return ca.Function(name, inputs, [after, ca.vertcat(motion, flanks), decided[count]])
+
+
+def opposed(contact: Contact) -> dict[str, Scalar]:
+    """Torque against each shaft per unit of friction in a contact."""
+    return {shaft: -arm for shaft, arm in contact.torque.items()}
+
+
+def _matrix(rows: Sequence[Row], shafts: Sequence[str]) -> Matrix:
+    return ca.vertcat(*(ca.horzcat(*(ca.SX(row.get(shaft, 0.0)) for shaft in shafts)) for row in rows))

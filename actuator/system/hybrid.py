@@ -28,6 +28,7 @@ from gear.quantities import require_known, show
 from gear.quantities.roles import FrictionMemory, Role
 
 MARGIN_BAND = 1e-10
+INACTIVE = 1.0  # value of a margin that means nothing in the present mode, but for the band
 AnyRole = TypeVar("AnyRole", bound=Role)
 
 
@@ -66,7 +67,7 @@ class Place(StrEnum):
 class ModeKind(StrEnum):
     """What an integer mode variable tells."""
 
-    MOTION = "motion"  # of a contact: 0 stuck, +-1 sliding, +-2 stuck at its limit
+    MOTION = "motion"  # of a contact: 0 stuck, +-1 sliding
     FLANK = "flank"  # of a mesh, coupling or stop: +1, -1, 0 in its gap
 
 
@@ -95,6 +96,7 @@ class Event(NamedTuple):
     at: str = ""
     place: Place = Place.MESH
     side: int = 0  # +1, -1; 0 where there is one margin for both sides
+    contacts: tuple[str, ...] = ()  # FRICTION: by name, those that let go together, or the one that reverses
 
 
 class Contact(NamedTuple):

@@ -34,7 +34,7 @@ class Mechanics(NamedTuple):
     def rubbing(self) -> list[tuple[Contact, Matrix, Matrix]]:
         """Every contact with its slip speed and friction, those that can stick first."""
         forces, contacts = self.forces, self.contacts
-        found = [(contact, forces.slip[k], forces.friction[k]) for k, contact in enumerate(contacts.contacts)]
+        found = [(contact, forces.slip[k], forces.shown[k]) for k, contact in enumerate(contacts.contacts)]
         for contact in contacts.creeping:
             slip = ca.SX(sum(c * self.speed[shaft] for shaft, c in contact.slip.items()))
             found.append((contact, slip, ca.SX(forces.by_memory[contact.name][0])))

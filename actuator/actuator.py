@@ -194,7 +194,12 @@ class _Assembly:
 
         arguments = [builder.x(), m, builder.u(), ca.vertcat(*(parameter.symbol for parameter in parameters))]
         fired = ca.SX.sym("fired", len(contacts.events()))
-        settle = contacts.reset_function("settle", arguments, fired, angle, speed, torque, m)
+        pose = contacts.pose_function("pose", arguments, fired, angle, speed, torque, m)
+        posed, modes_after, speeds_after = pose(fired, *arguments)
+        first = [state.name for state in builder.states].index(next(iter(symbols[1].values())).name())
+        x, count = arguments[0], len(symbols[1])
+        x_after = ca.vertcat(x[:first, :], speeds_after, x[first + count :, :])
+        pose = ca.Function("pose", [fired, *arguments], [posed, modes_after, x_after], SHARED)
         clocks = _clocks(actuator.sampling)
         self.system = HybridSystem(
             name=actuator.name,
@@ -208,7 +213,8 @@ class _Assembly:
             flow=ca.Function("flow", arguments, [builder.flow()], SHARED),
             contact_state=ca.Function("contact_state", arguments, contacts.state(forces), SHARED),
             margins=ca.Function("margins", arguments, [contacts.margins(forces, modes)], SHARED),
-            reset=_whole_reset(settle, arguments, [state.name for state in builder.states], list(symbols[1].values())),
+            pose=pose,
+            reset=contacts.reset_function("reset", pose),
             check=lambda values: _check_values(actuator, values),
             outputs_function=ca.Function("outputs", arguments, [builder.y()], SHARED),
             clocks=clocks,
@@ -225,14 +231,6 @@ class _Assembly:
             builder.output(name, unit, value)
         builder.output("load_power", "W", load.power(*at, *own) - outside * motion.load_speed)
         return load.torque(*at, *own) + outside
-
-
-def _whole_reset(settle: ca.Function, arguments: list[ca.SX], states: list[str], speeds: list[ca.SX]) -> ca.Function:
-    """Reset of the mechanics, everything else unchanged."""
-    inputs = [ca.MX.sym(f"input{i}", settle.size1_in(i)) for i in range(1 + len(arguments))]
-    after, modes, fault = settle.call(inputs, True, False)  # inline: the decision has no derivative, the rest has
-    x, first = inputs[1], states.index(speeds[0].name())
-    return ca.Function("reset", inputs, [ca.vertcat(x[:first, :], after, x[first + len(speeds) :, :]), modes, fault])
 
 
 def _clocks(sampling: Sampling | None) -> tuple[Clock, ...]:

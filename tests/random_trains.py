@@ -1,4 +1,4 @@
-"""Random trains with contacts at rest, several of which lock the same shafts, and limit analysis by linear programming."""
+"""Random trains with contacts at rest, several of which lock the same shafts, and limit analysis by programming."""
 
 import numpy as np
 import scipy.linalg
@@ -63,7 +63,7 @@ def motions_without_slip(slip):
 
 
 def needed_part(problem):
-    """The smallest part of all static limits with which nothing slips: T's + M a = f without slip; inf where none does."""
+    """The smallest part of all static limits with which nothing slips: T's + M a = f ; inf where none does."""
     moves = problem.inertia @ motions_without_slip(problem.slip)
     moves = moves / np.maximum(abs(moves).max(axis=0, initial=0), 1e-300)
     balance = np.column_stack([problem.torque.T * problem.static, moves, np.zeros(len(problem.load))])

@@ -187,7 +187,8 @@ def on_one_shaft(load, **gear):
     energy = train.shafts["arm"].inertia * x[1] ** 2 / 2 + load.kinetic(x[0], x[1])
     energy += train.elastic_energy(forces.motions, angle, modes.flank)
     fired = ca.SX.sym("fired", len(contacts.events()))
-    settle = contacts.reset_function("settle", arguments, fired, angle, speed, on_shaft, m)
+    pose = contacts.pose_function("pose", arguments, fired, angle, speed, on_shaft, m)
+    settle = contacts.reset_function("settle", pose)
     inputs = [ca.MX.sym(f"input{i}", settle.size1_in(i)) for i in range(5)]
     after, settled, fault = settle(*inputs)
     return HybridSystem(

@@ -1,17 +1,17 @@
 """Contacts that share shafts, in runs: against one contact with the sum of their limits, and against time stepping.
 
 The time stepping is J. J. Moreau's: over each step the impulses of friction are those within their limits that make the
-kinetic energy of the end the least, found by a bounded least-squares solver. It knows no events and no modes, and shares
-nothing with the engine.
+kinetic energy of the end the least, found by a bounded least-squares solver. It knows no events and no modes, and
+shares nothing with the engine.
 """
 
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from actuator import Actuator, Load, Sine, Step, Table, TorqueSource, classify, find_orbit, simulate
+from actuator import Actuator, Load, Sine, Table, TorqueSource, find_orbit, simulate
 from controllers import PID
-from gear import Bearing, Coulomb, Coupling, GivenPair, Linear, Mesh, Shaft, Transmission
+from gear import Bearing, Coulomb, GivenPair, Linear, Mesh, Shaft, Transmission
 
 
 def on_one_shaft(inertia, controller=None, **bearings):

@@ -380,7 +380,7 @@ class ContactMechanics:
             released=ca.vertcat(*released),
         )
 
-    def reset_function(
+    def pose_function(
         self,
         name: str,
         arguments: list[ca.SX],
@@ -390,9 +390,10 @@ class ContactMechanics:
         torque: Mapping,
         m: ca.SX,
     ) -> ca.Function:
-        """(fired, *arguments) -> speeds after, modes after, fault; all modes decided together.
+        """(fired, *arguments) -> problem to be decided as a vector, modes after but for that, speeds after.
 
-        Contacts at rest get their slip speed set to exactly zero by an impulse along their own friction.
+        Contacts at rest get their slip speed set to exactly zero by an impulse along their own friction; their motion
+        is what is decided.
         """
         before = self.modes(m)
         flank = self.flanks_after(fired, angle, speed, before.flank)
@@ -403,19 +404,20 @@ class ContactMechanics:
         after = self.without_slip({shaft: speed[shaft] + step[shaft] for shaft in self.gear.shafts}, problem.rest)
         speeds = ca.vertcat(*(after[shaft] for shaft in self.kinematics.independent))
         posed = ca.vertcat(*(ca.vec(ca.SX(part).T) for part in problem))
-        pose = ca.Function(
-            f"{name}_pose",
-            [fired, *arguments],
-            [posed, problem.rest, ca.sign(slip), ca.vertcat(*flank), speeds],
-            SHARED,
-        )
-        inputs = [ca.MX.sym(f"input{i}", symbol.shape[0]) for i, symbol in enumerate((fired, *arguments))]
-        posed, rest, direction, flanks, after = pose(*inputs)
+        modes = ca.vertcat(ca.if_else(problem.rest, 0, ca.sign(slip)), *flank)
+        return ca.Function(name, [fired, *arguments], [posed, modes, speeds], SHARED)
+
+    def reset_function(self, name: str, pose: ca.Function) -> ca.Function:
+        """From `pose`: (fired, *arguments) -> what is after, modes after, fault; all modes decided together."""
+        count = len(self.contacts)
+        inputs = [ca.MX.sym(f"input{i}", pose.size1_in(i)) for i in range(pose.n_in())]
+        posed, modes, after = pose(*inputs)
         if not count:
-            return ca.Function(name, inputs, [after, flanks, 0])
+            return ca.Function(name, inputs, [after, modes, 0])
         decided = decision_function(len(self.kinematics.independent), count)(posed)
-        motion = ca.if_else(rest, decided[:count], direction)
-        return ca.Function(name, inputs, [after, ca.vertcat(motion, flanks), decided[count]])
+        # what is not at rest has no motion decided, and what is has none before
+        motion = ca.vertcat(modes[:count] + decided[:count], modes[count:])
+        return ca.Function(name, inputs, [after, motion, decided[count]])
 
 
 def opposed(contact: Contact) -> dict[str, Scalar]:

@@ -1,7 +1,7 @@
 """The joint decision of the contacts as a CasADi function, for all that calls it as one of a model's functions.
 
-It is machine code already. Where there is a C compiler it stands behind a shim in C, so that generated code can call it;
-else CasADi calls it through Python. What is decided has no derivative: the modes are whole numbers.
+It is machine code already. Where there is a C compiler it stands behind a shim in C, so that generated code can call
+it; else CasADi calls it through Python. What is decided has no derivative: the modes are whole numbers.
 """
 
 import ctypes
@@ -43,8 +43,8 @@ const long long* jac_{name}_sparsity_out(long long i) {{ return none; }}
 @numba.cfunc("void(CPointer(double), CPointer(double), int64, int64)")
 def _kernel(problem, result, shafts, count):
     size = shafts * (shafts + 1) + count * (2 * shafts + 5)
-    found = numba.carray(result, count + 1)
-    found[count] = decide_vector(numba.carray(problem, size), shafts, found[:count])
+    found = numba.carray(result, count + 1)  # type: ignore[attr-defined]
+    found[count] = decide_vector(numba.carray(problem, size), shafts, found[:count])  # type: ignore[attr-defined]
 
 
 @cache

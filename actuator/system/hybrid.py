@@ -142,6 +142,10 @@ class HybridSystem:
         Sampled loops; none in continuous time.
     tick, period : casadi.Function or None
         As above; `due` is a vector with 1 at the clocks that are due. None without clocks.
+    pose : casadi.Function or None
+        (fired, x, m, u, p) -> problem, m+, x+: `reset` but for the decision about the contacts at rest, whose motion m+
+        (0 here, and the first of m) is what `gear.stiction.decision.decide_vector` makes of the problem. For engines
+        that call that themselves; None where `reset` needs no decision.
     contact_state : casadi.Function or None
         (x, m, u, p) -> slip speed, friction, friction limit at rest, friction while sliding, each (K, 1) in the order
         of the contacts; None for a system without contacts.
@@ -161,6 +165,7 @@ class HybridSystem:
     reset: ca.Function
     outputs_function: ca.Function
     contacts: tuple[Contact, ...] = ()
+    pose: ca.Function | None = None
     contact_state: ca.Function | None = None
     check: Callable[[Mapping[str, float]], None] | None = None
     clocks: tuple[Clock, ...] = ()

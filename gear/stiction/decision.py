@@ -13,8 +13,8 @@ each of them has three possibilities, and all must find theirs together:
 
 A group holds exactly as long as any sharing of its load within the static limits exists, whatever was before: the
 theorems of limit analysis. What cannot be held moves; it falls to its friction while sliding, and the others are asked
-again, until nothing new moves. That is a decision for given limits each time, and the set of what moves only grows. What
-was released and ends without slip is stuck again.
+again, until nothing new moves. That is a decision for given limits each time, and the set of what moves only grows.
+What was released and ends without slip is stuck again.
 
 For given limits with T = S (bearings, meshes that stick by "conjugate speed") there is exactly one motion, the minimum
 of a strictly convex function (`descent`). With T not S (stick by "mesh speed") there may be several, "all hold" among
@@ -31,6 +31,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gear.quantities import Matrix
 from gear.stiction.descent import allowance, descend
 from gear.stiction.elimination import applied, compiled, product, reduce, remaining
 from gear.stiction.lemke import follow_path
@@ -42,17 +43,17 @@ NO_LIMIT = 1e-12  # part of the largest limit, as torque on a shaft, below which
 
 
 class RestProblem(NamedTuple):
-    """What the joint decision is about, for K contacts and n independent shafts."""
+    """What the joint decision is about, for K contacts and n independent shafts: numbers, or expressions."""
 
-    inertia: np.ndarray  # (n, n)
-    load: np.ndarray  # (n, 1): all torques, with the friction of the contacts that are not at rest
-    slip: np.ndarray  # (K, n): slip speed per speed of each shaft
-    torque: np.ndarray  # (K, n): torque against each shaft per unit of friction
-    static: np.ndarray  # (K, 1): friction limit at rest, >= 0
-    forward: np.ndarray  # (K, 1): friction at the onset of sliding forward, 0 <= forward <= static
-    backward: np.ndarray  # (K, 1): and backward
-    rest: np.ndarray  # (K, 1): 1 where the slip speed is zero and the contact takes part
-    released: np.ndarray  # (K, 1): 1 where it has just let go
+    inertia: Matrix  # (n, n)
+    load: Matrix  # (n, 1): all torques, with the friction of the contacts that are not at rest
+    slip: Matrix  # (K, n): slip speed per speed of each shaft
+    torque: Matrix  # (K, n): torque against each shaft per unit of friction
+    static: Matrix  # (K, 1): friction limit at rest, >= 0
+    forward: Matrix  # (K, 1): friction at the onset of sliding forward, 0 <= forward <= static
+    backward: Matrix  # (K, 1): and backward
+    rest: Matrix  # (K, 1): 1 where the slip speed is zero and the contact takes part
+    released: Matrix  # (K, 1): 1 where it has just let go
 
 
 class Decision(NamedTuple):
@@ -74,7 +75,7 @@ def decide(problem: RestProblem) -> Decision:
 
 
 @compiled
-def decide_contacts(  # noqa: PLR0913 - what a RestProblem has, and room for the answer
+def decide_contacts(
     inertia: np.ndarray,
     load: np.ndarray,
     slip: np.ndarray,

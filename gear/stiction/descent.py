@@ -46,7 +46,7 @@ def pushed(load: np.ndarray, torque: np.ndarray, friction: np.ndarray, free: np.
 def slip_accelerations(
     slip: np.ndarray, torque: np.ndarray, motions: np.ndarray, mobile: np.ndarray, shafts: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Of all contacts, and the slip acceleration that a unit of their own friction takes; zeros where they are locked."""
+    """Of all contacts, and the slip acceleration that their own friction takes per unit; zeros where locked."""
     slips, ease = np.zeros(len(slip)), np.zeros(len(slip))
     for i in range(len(slip)):
         if not is_locked(slip[i], motions):
@@ -68,9 +68,10 @@ def descend(
     free: np.ndarray,
     friction: np.ndarray,
 ) -> tuple[int, np.ndarray, np.ndarray]:
-    """Change `free` and `friction` until they are a decision for these limits: how many steps that took, -1 for none.
+    """Change `free` and `friction` until they are a decision for these limits.
 
-    Beside that, the slip acceleration of every contact, and what a unit of its own friction takes of it. Free contacts hold, and the others are at one of their limits or do not touch anything that moves.
+    Free contacts hold, and the others are at one of their limits or touch nothing that moves. Returns how many steps
+    that took, -1 for no end; the slip acceleration of every contact; what its own friction takes of it per unit.
     """
     count, steps = len(lower), 0
     small = allowance(torque, load, upper - lower)

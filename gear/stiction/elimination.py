@@ -121,7 +121,7 @@ def reduce(rows: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 @compiled
 def remaining(table: np.ndarray, pivots: np.ndarray) -> np.ndarray:
-    """Z: columns span the motions in which no row slips of those that were reduced; entries that are known are exact."""
+    """Z: columns span the motions in which none of the reduced rows slips; entries that are known are exact."""
     rank, n = table.shape
     motions, column = np.zeros((n, n - rank)), 0
     for j in range(n):
@@ -165,7 +165,7 @@ def mobility(inertia: np.ndarray, motions: np.ndarray, torques: np.ndarray) -> n
 
 @compiled
 def reactions(torque: np.ndarray, pivots: np.ndarray, chosen: np.ndarray, residual: np.ndarray) -> np.ndarray:
-    """Friction of the chosen contacts that brings the torques `residual`, from those on the pivot shafts; zeros else."""
+    """Friction of the chosen contacts that brings the torques `residual`, by those on the pivot shafts."""
     result, count = np.zeros(len(chosen)), 0
     for i in range(len(chosen)):
         count += chosen[i]

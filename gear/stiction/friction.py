@@ -102,7 +102,7 @@ def _semidefinite_solution(matrix: Matrix, right: Matrix) -> Matrix:
 
 
 def motion_without_slip(slip: Sequence[Row], held: Matrix, shafts: Sequence[str]) -> Matrix:
-    """Z, (n, n): takes the motion of the shafts to one in which no held contact slips, and leaves such a motion as it is.
+    """Z, (n, n): takes the motion of the shafts to one in which no held contact slips, and leaves such a one as it is.
 
     One shaft per independent held contact follows the others, by elimination on the slip rows; so what holds has a slip
     of zero by construction, and where nothing is left to move Z is exactly zero.

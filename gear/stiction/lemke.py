@@ -17,7 +17,7 @@ UNLIKE = 0.6180339887498949  # multiples of it, less whole numbers, make weights
 
 
 @compiled
-def follow_path(  # noqa: PLR0912, PLR0915 - one pivot rule, one vertex: cut apart it is harder to follow
+def follow_path(
     inertia: np.ndarray,
     load: np.ndarray,
     slip: np.ndarray,

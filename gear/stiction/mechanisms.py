@@ -16,11 +16,12 @@ from itertools import combinations
 import numpy as np
 
 from gear.kinematics import Kinematics, Row
+from gear.quantities import Scalar
 
 SLIPS = 1e-9  # part of its own row above which a contact slips in a mechanism
 
 
-def mechanisms(torque: Sequence[Row], values: Sequence[Row], shafts: Sequence[str]) -> list[dict[int, object]]:
+def mechanisms(torque: Sequence[Row], values: Sequence[Row], shafts: Sequence[str]) -> list[dict[int, Scalar]]:
     """All of them: of the contacts that slip, by number, friction's torque per unit along the motion, c_i.
 
     Parameters
@@ -33,7 +34,7 @@ def mechanisms(torque: Sequence[Row], values: Sequence[Row], shafts: Sequence[st
         The independent shafts.
     """
     rank = structural_rank(values, shafts)
-    found: dict[tuple[int, ...], dict[int, object]] = {}
+    found: dict[tuple[int, ...], dict[int, Scalar]] = {}
     for stuck in combinations(range(len(values)), rank - 1) if rank else ():
         motion = [
             Kinematics(list(shafts), [rows[k] for k in stuck], [values[k] for k in stuck], keep=[])
@@ -60,6 +61,6 @@ def structural_rank(rows: Sequence[Row], shafts: Sequence[str]) -> int:
     return len(shafts) - len(Kinematics(list(shafts), list(rows), list(rows), keep=[]).independent)
 
 
-def _along(row: Row, motion: Kinematics, free: str) -> object:
+def _along(row: Row, motion: Kinematics, free: str) -> Scalar:
     """Power of a row's torques along the motion of one shaft, the others following."""
     return sum((c * motion.turns[shaft][free] for shaft, c in row.items() if free in motion.turns[shaft]), 0.0)

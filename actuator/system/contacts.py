@@ -416,7 +416,7 @@ class ContactMechanics:
             return ca.Function(name, inputs, [after, modes, 0])
         decided = decision_function(len(self.kinematics.independent), count)(posed)
         # what is not at rest has no motion decided, and what is has none before
-        motion = ca.vertcat(modes[:count] + decided[:count], modes[count:])
+        motion = ca.vertcat(modes[:count, :] + decided[:count, :], modes[count:, :])
         return ca.Function(name, inputs, [after, motion, decided[count]])
 
 

@@ -178,7 +178,7 @@ def on_one_shaft(load, **gear):
     x, torque, force = ca.SX.sym("x", 2), ca.SX.sym("torque"), ca.SX.sym("force")
     angle, speed = {"arm": x[0]}, {"arm": x[1]}
     inertia = {"arm": train.shafts["arm"].inertia + load.inertia_at(x[0])}
-    contacts = ContactMechanics(train, False, numbers_of.kinematics(train), inertia)
+    contacts = ContactMechanics(train, False, numbers_of.kinematics(train), inertia, {})
     m = ca.SX.sym("m", len(contacts.mode_variables()))
     modes = contacts.modes(m)
     on_shaft = {"arm": torque + load.torque(x[0], x[1], force)}

@@ -606,7 +606,7 @@ def test_report(tuned, tmp_path):
     [
         (
             lambda: replace(servo(), motor=TorqueSource(), controller=None),
-            "tuning takes the gains of a controller, and there is none",
+            "tuning needs a controller, and there is none",
         ),
         (
             lambda: replace(

@@ -79,7 +79,8 @@ def finish_frequency(axes: Axes) -> None:
     axes.set_xlabel("frequency in Hz")
     axes.set_xscale("log")
     low, high = axes.get_xlim()
-    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if np.log10(high / low) < FEW_DECADES else (1,)))
+    few = high < low * 10**FEW_DECADES  # nothing drawn: limits of no meaning, which may be negative
+    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if few else (1,)))
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.xaxis.set_minor_formatter(NullFormatter())
 

@@ -29,8 +29,8 @@ class Balance:
         From outside on the input and output shaft [N m]; positive accelerates.
     speeds : dict of str to float
         Of every shaft [rad/s].
-    normal : dict of str to float
-        Signed normal force of each mesh [N].
+    normal, friction : dict of str to float
+        Signed normal force and friction scalar of each mesh [N].
     loss : dict of str to float
         Power lost in each mesh and bearing [W], by path.
     """
@@ -39,6 +39,7 @@ class Balance:
     output_torque: float
     speeds: dict[str, float]
     normal: dict[str, float]
+    friction: dict[str, float]
     loss: dict[str, float] = field(repr=False)
 
     def input_power(self, gear: Transmission) -> float:
@@ -126,6 +127,7 @@ def balance(
         output_torque=output_torque,
         speeds=speeds,
         normal={name: float(force) for name, force in zip(gear.meshes, forces, strict=True)},
+        friction={name: float(scalar) for name, scalar in zip(gear.meshes, scalars, strict=True)},
         loss={name: float(power) for name, power in loss.items()},
     )
 

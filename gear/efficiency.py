@@ -43,19 +43,24 @@ def efficiency(
 
 
 def mesh_efficiencies(gear: Transmission, *, torque: float, speed: float) -> dict[str, float]:
-    """Efficiency [-] of each mesh while the input drives: one minus its loss over the power it passes on.
+    """Efficiency [-] of each mesh while the input drives: one minus its loss over the power that enters it.
 
-    The power is that of the relative motion to the carrier, which is what the teeth see.
+    The power is that of the relative motion to the carrier, which is what the teeth see, by normal force and friction.
     """
     found = balance(gear, output_torque=-np.sign(speed) * torque, output_speed=speed)
     result = {}
     for name, mesh in gear.meshes.items():
-        motion = mesh.motion(found.speeds, found.speeds)
-        arms = mesh.torque_per_normal()
-        through = abs(found.normal[name]) * max(
-            abs(float(arms[mesh.a]) * motion.speed_a), abs(float(arms[mesh.b]) * motion.speed_b)
+        motion, normal, rubs = (
+            mesh.motion(found.speeds, found.speeds),
+            mesh.torque_per_normal(),
+            mesh.torque_per_friction(),
         )
-        result[name] = 1 - found.loss[f"meshes.{name}"] / through if through > 0 else float("nan")
+        powers = [
+            -(float(normal[wheel]) * found.normal[name] + float(rubs[wheel]) * found.friction[name]) * speed
+            for wheel, speed in ((mesh.a, motion.speed_a), (mesh.b, motion.speed_b))
+        ]
+        entering = sum(max(float(power), 0.0) for power in powers)
+        result[name] = 1 - found.loss[f"meshes.{name}"] / entering if entering > 0 else float("nan")
     return result
 
 

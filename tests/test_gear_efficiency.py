@@ -6,10 +6,25 @@ power balance.
 
 import math
 
+import casadi as ca
+import numpy as np
 import pytest
 
-from actuator import Actuator, Load, TorqueSource, simulate
-from gear import Backlash, Bearing, Coulomb, ExternalPair, Linear, Mesh, Shaft, Transmission
+from actuator import Actuator, Load, TorqueSource, linearize, simulate, trim
+from controllers import PID
+from gear import (
+    Backlash,
+    Bearing,
+    Coulomb,
+    EfficiencyPoint,
+    ExternalPair,
+    GivenPair,
+    Linear,
+    Mesh,
+    Shaft,
+    TabulatedEfficiency,
+    Transmission,
+)
 from gear.arrangements import spur_pair, train
 from gear.balance import balance
 from gear.breakout import breakout, scale_friction
@@ -40,8 +55,20 @@ def test_the_efficiency_of_a_train_is_the_product_of_its_meshes():
     gear = train([PAIR, PAIR, PAIR], [1e-5] * 4, LAWS)
     assert efficiency(gear, torque=5.0, speed=1.0) == pytest.approx(by_hand(PAIR, 0.1, True) ** 3, rel=1e-10)
     assert list(mesh_efficiencies(gear, torque=5.0, speed=1.0).values()) == pytest.approx(
-        [by_hand(PAIR, 0.1, True)] * 3, rel=2e-3
+        [by_hand(PAIR, 0.1, True)] * 3, rel=1e-10
     )
+
+
+GIVEN = GivenPair(radius_a=0.01, radius_b=0.03, friction_factor=0.84, friction_arm_a=9.2e-3, friction_arm_b=15e-3)
+
+
+@pytest.mark.parametrize("pair", [PAIR, GIVEN])
+@pytest.mark.parametrize("tabulated", [0.98, 0.9, 0.7, 0.5])
+@pytest.mark.parametrize("speed", [1.0, -1.0])
+def test_a_mesh_has_the_efficiency_that_its_table_says(pair, tabulated, speed):
+    table = TabulatedEfficiency(points=(EfficiencyPoint(speed=0.0, a_drives=tabulated, b_drives=tabulated),))
+    gear = train([pair, pair], [1e-5] * 3, MeshLaws(elasticity=Linear(stiffness=1e8, damping=1.0), friction=table))
+    assert list(mesh_efficiencies(gear, torque=5.0, speed=speed).values()) == pytest.approx([tabulated] * 2, rel=1e-10)
 
 
 def test_a_steady_run_has_the_efficiency_of_the_balance():
@@ -131,3 +158,28 @@ def test_backlash_does_not_change_a_steady_balance():
 def test_what_cannot_be_answered_is_refused(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+DRAG = Drag(shaft="a", speeds=(0.0, 2.0, 10.0, 30.0), torques=(0.0, 0.1, 0.2, 0.1))
+
+
+def test_a_drag_is_its_table_turned_against_the_motion_on_both_sides():
+    speeds = np.concatenate([np.linspace(-40, 40, 801), [1e-12, -1e-12]])
+    found = [float(DRAG.torque(speed)) for speed in speeds]
+    expected = -np.sign(speeds) * np.interp(abs(speeds), DRAG.speeds, DRAG.torques)
+    np.testing.assert_allclose(found, expected, rtol=1e-13, atol=1e-25)
+
+
+def test_the_slope_of_a_drag_has_no_corner_at_standstill():
+    speed = ca.SX.sym("speed")
+    slope = ca.Function("slope", [speed], [ca.jacobian(DRAG.torque(speed), speed)])
+    assert [float(slope(v)) for v in (-1e-12, 0.0, 1e-12, 1.0)] == [-0.05] * 4
+
+
+@pytest.mark.parametrize("reference", [0.0, 0.1, 0.3, 0.7])
+def test_a_linear_model_at_rest_has_the_slope_of_the_drag(reference):
+    drag = Drag(shaft="s", speeds=(0.0, 1000.0), torques=(0.0, 20.0))
+    gear = Transmission(shafts={"s": Shaft(inertia=0.01)}, drags={"d": drag}, input="s", output="s")
+    rotor = Actuator(motor=TorqueSource(), gear=gear, controller=PID(proportional=3.0, integral=4.0, derivative=0.6))
+    model = linearize(trim(rotor, {}, inputs={"reference": reference}), ["load_torque"], ["load_angle"])
+    assert model.A[-1, -1] == pytest.approx(-(0.6 + 20.0 / 1000.0) / 0.01, rel=1e-12)

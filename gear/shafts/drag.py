@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from itertools import pairwise
 
-from gear.friction.tables import piecewise_linear
+import casadi as ca
+
 from gear.lubrication.drag import Thickening
 from gear.quantities import Scalar
 from gear.quantities.registry import part
@@ -53,7 +54,20 @@ class Drag(ShaftDrag):
             raise ValueError(f"{where}: torques must begin with 0 N m and not be negative, got {self.torques}")
 
     def torque(self, speed: Scalar) -> Scalar:
-        """Torque on the shaft [N m] at a signed speed [rad/s]; an odd function, so no sign is taken."""
-        mirrored = (*(-value for value in reversed(self.speeds[1:])), *self.speeds)
-        odd = (*(-value for value in reversed(self.torques[1:])), *self.torques)
-        return -piecewise_linear(speed, mirrored, odd) * (1.0 if self.thickening is None else self.thickening.factor())
+        """Torque on the shaft [N m] at a signed speed [rad/s]; an odd function, so no sign is taken.
+
+        The first part of the table and its image are one straight line through standstill, where there is no corner.
+        """
+        first = self.speeds[1]
+        opposing = self.torques[1] / first * ca.fmax(-first, ca.fmin(speed, first))
+        for low, high, begin, end in zip(
+            self.speeds[1:], self.speeds[2:], self.torques[1:], self.torques[2:], strict=False
+        ):
+            passed = _clip(speed - low, high - low) - _clip(-speed - low, high - low)
+            opposing += (end - begin) / (high - low) * passed
+        return -opposing * (1.0 if self.thickening is None else self.thickening.factor())
+
+
+def _clip(value: Scalar, width: float) -> Scalar:
+    """A value within 0 and a width."""
+    return ca.fmin(ca.fmax(value, 0), width)

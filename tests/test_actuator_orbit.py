@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 from mass_on_guide import MassOnGuide
 
-from actuator import NoOrbit, continue_orbit, find_orbit, simulate
+from actuator import Actuator, Load, NoOrbit, TorqueSource, classify, continue_orbit, find_orbit, simulate
 from actuator.orbits.flow import flow_map
 from actuator.orbits.sampled import SampledOrbit
 from actuator.orbits.segments import passage
-from controllers import Sampling
+from controllers import PID, Sampling
+from gear import GivenPair, Linear, Mesh, Shaft, Stribeck, Transmission
 
 pytestmark = pytest.mark.thorough
 
@@ -164,3 +165,27 @@ def test_a_sampled_system_has_a_sampled_orbit():
     signals = orbit.signals(["load_angle"])
     assert orbit.times[-1] == pytest.approx(orbit.period)
     assert np.ptp(signals["load_angle"]) / 2 == orbit.load_amplitude
+
+
+def test_a_mass_with_a_stribeck_law_has_an_orbit():
+    pair = GivenPair(radius_a=1.0, radius_b=1.0, friction_arm_a=1.0, friction_arm_b=0.0, pressure_angle=1e-9)
+    guide = Mesh(
+        a="mass",
+        b="weight",
+        pair=pair,
+        elasticity=Linear(stiffness=1e6, damping=0.2),
+        friction=Stribeck(static=1.5, coulomb=1.0, stribeck_speed=0.02),
+        stick_by="conjugate speed",
+    )
+    shafts = {"mass": Shaft(inertia=1.0), "weight": Shaft(inertia=1e-8)}
+    plant = Actuator(
+        motor=TorqueSource(),
+        load=Load(bias=1.0),  # presses the mass on its guide
+        controller=PID(proportional=3.0, integral=10.0, derivative=6.0),
+        gear=Transmission(shafts=shafts, meshes={"guide": guide}, input="mass", output="weight"),
+    )
+    start = {"mass.angle": 0.06, "weight.angle": -0.06, "controller.integral": -1.0}
+    run = simulate(plant, 200.0, start=start, resolution=0.02)
+    orbit = find_orbit(plant, run)
+    assert orbit.period == pytest.approx(classify(run).period_s, rel=1e-3)
+    assert orbit.trivial_error < 1e-6

@@ -300,6 +300,27 @@ def test_efficiency_of_a_whole_cold_gearbox_needs_a_coefficient_above_0_9():
 # -- Stribeck, tables, viscosity, position ------------------------------------------------------------
 
 
+@pytest.mark.parametrize("speed", [-1.0, -1e-3, -1e-11, -1e-13, 0.0, 1e-13, 1e-4, 1.0])
+@pytest.mark.parametrize("exponent", [1.0, 1.5, 2.0])
+def test_stribeck_is_finite_with_all_slopes_below_zero_speed_too(speed, exponent):
+    """Where a stage of an integrator or a Newton step comes; from zero on against the slopes by hand."""
+    v, vs, e = (ca.SX.sym(name) for name in ("v", "vs", "e"))
+    law = object.__new__(Stribeck)
+    for name, value in {"static": 1.5, "coulomb": 1.0, "stribeck_speed": vs, "exponent": e, "viscous": 0.0}.items():
+        object.__setattr__(law, name, value)
+    mu = law.coefficient(at(v))
+    slopes = ca.Function("slopes", [v, vs, e], [mu, *(ca.jacobian(mu, of) for of in (v, vs, e))])
+    found = [float(value) for value in slopes(speed, 0.1, exponent)]
+    assert np.isfinite(found).all()
+    if speed < 0:
+        assert found[0] == pytest.approx(1.5, abs=1e-10)
+    else:
+        x = speed / 0.1
+        fall = 0.5 * np.exp(-(x**exponent))
+        by_speed = -fall * exponent * x ** (exponent - 1) / 0.1
+        assert found[:3] == pytest.approx([1.0 + fall, by_speed, -by_speed * x], abs=1e-9 if exponent != 1.5 else 3e-5)
+
+
 @pytest.mark.parametrize("exponent", [1.0, 2.0, 3.5])
 def test_stribeck_is_its_formula(exponent):
     law = Stribeck(static=0.3, coulomb=0.1, stribeck_speed=0.01, exponent=exponent, viscous=0.05)

@@ -20,7 +20,8 @@ from gear.quantities import (
 from gear.quantities.registry import part
 from gear.quantities.roles import Breakaway, SlidingFriction
 
-SPEED_FLOOR = 1e-12  # m/s, added to the speed: keeps the logarithm in the slope over the exponent finite
+# m/s, of a speed that stays above zero and smooth where a step or a search goes below it, by this and no more above
+FLOOR, BEND, LEAST = 1e-12, 1e-17, 1e-30
 
 
 @part(SpeedLaw)
@@ -74,12 +75,21 @@ class Stribeck(SpeedLaw):
 
     def coefficient(self, sliding: Sliding) -> Scalar:
         """Sliding coefficient [-]."""
-        fall = ca.exp(-(((sliding.speed + SPEED_FLOOR) / self.stribeck_speed) ** self.exponent))
+        fall = ca.exp(-((_above_zero(sliding.speed) / self.stribeck_speed) ** self.exponent))
         return self.coulomb + (self.static - self.coulomb) * fall + self.viscous * sliding.speed
 
     def breakaway(self, sliding: Sliding) -> Scalar:
         """Coefficient [-] that holds the mesh at rest."""
         return self.static
+
+
+def _above_zero(speed: Scalar) -> Scalar:
+    """A speed [m/s] >= 0 as it is but for 1e-12, and below zero next to nothing.
+
+    A logarithm of it, in the slope over the exponent, is finite on both sides; its slope over the speed is 1 at zero.
+    """
+    raised = speed + FLOOR
+    return (raised + ca.sqrt(raised**2 + BEND**2)) / 2 + LEAST
 
 
 @dataclass(frozen=True, kw_only=True)

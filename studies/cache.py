@@ -52,6 +52,16 @@ def hash_source(folders: Iterable[Path]) -> str:
     return found.hexdigest()
 
 
+def _row(line: bytes) -> tuple[str, dict[str, Any]] | None:
+    """Key and result of a line of the file; None where it is damaged, and its result has to be computed again."""
+    try:
+        row = json.loads(line)
+        key, result = row["key"], row["result"]
+    except (ValueError, KeyError, TypeError):
+        return None
+    return (key, result) if isinstance(key, str) and isinstance(result, dict) else None
+
+
 # -- the file -----------------------------------------------------------------------------------------------
 
 
@@ -69,6 +79,7 @@ class Cache(MutableMapping[str, dict[str, Any]]):
     def __init__(self, path: Path, program: str | None = None) -> None:
         self.path = path
         self.reused: set[str] = set()  # keys that were in the file and have been read
+        self.damaged = 0  # lines of the file that hold no result, after a loss of power or an edit
         self._items: dict[str, dict[str, Any]] = {}
         self._head = json.dumps({"program": program or program_fingerprint()}).encode() + b"\n"
         self._lock = threading.Lock()
@@ -78,8 +89,9 @@ class Cache(MutableMapping[str, dict[str, Any]]):
             whole = text[: text.rfind(b"\n") + 1]
             if len(whole) < len(text):
                 os.truncate(path, len(whole))
-            rows = map(json.loads, whole[len(self._head) :].splitlines())
-            self._items = {row["key"]: row["result"] for row in rows}
+            rows = [_row(line) for line in whole[len(self._head) :].splitlines()]
+            self._items = dict(row for row in rows if row is not None)
+            self.damaged = rows.count(None)
         self._loaded = frozenset(self._items)
 
     def __getitem__(self, key: str) -> dict[str, Any]:

@@ -166,7 +166,8 @@ def run_study(plan: Callable[[], Study], folder: Path, *, jobs: int = 1, first: 
         chosen = plan()
         cache = open_cache(folder)
         if cache:
-            click.echo(f"Resuming: {len(cache)} results found in {cache.path}")
+            damaged = f"; {cache.damaged} damaged lines are computed again" if cache.damaged else ""
+            click.echo(f"Resuming: {len(cache)} results found in {cache.path}{damaged}")
         before, began = len(cache), time.perf_counter()
         with ProgressBar(chosen.title) as bar:
             found = chosen.run(Work(cache=cache, jobs=jobs, progress=bar.move))

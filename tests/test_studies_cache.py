@@ -51,6 +51,33 @@ def test_a_file_cut_anywhere_gives_its_whole_lines_and_can_be_gone_on_with(tmp_p
     assert len(again) == left + 1
 
 
+DAMAGE = [
+    b"\0" * 100,
+    b"{",
+    b"[]",
+    b"3",
+    b"{}",
+    b'{"key": "b"}',
+    b'{"key": 1, "result": {}}',
+    b'{"key": "b", "result": 2}',
+]
+
+
+@pytest.mark.parametrize("damage", [*DAMAGE, b"\xff\xfe"])
+def test_a_damaged_line_is_passed_over_and_counted(tmp_path, damage):
+    path = tmp_path / FILE
+    first = Cache(path, "program")
+    first["a"] = {"x": 1.0}
+    with path.open("ab") as file:
+        file.write(damage + b"\n")
+    first["c"] = {"x": 3.0}
+    again = Cache(path, "program")
+    assert dict(again) == {"a": {"x": 1.0}, "c": {"x": 3.0}}
+    assert again.damaged == 1
+    again["b"] = {"x": 2.0}
+    assert dict(Cache(path, "program")) == {"a": {"x": 1.0}, "b": {"x": 2.0}, "c": {"x": 3.0}}
+
+
 def test_what_another_program_found_is_not_used_and_does_not_pile_up(tmp_path):
     path = tmp_path / FILE
     for version in ("one", "two", "three"):

@@ -14,6 +14,7 @@ from studies.units import split
 Table = dict[str, Any]
 Steps = tuple[str | int, ...]  # the way to a value through tables and lists, in names of fields
 LONGEST = 60  # characters of a value in a message
+LONGEST_PATH = 1000  # characters of a base; no system takes names that are much longer
 
 
 class StudyError(ValueError):
@@ -100,6 +101,11 @@ def built_in_files() -> dict[str, Traversable]:
     return dict(sorted(found.items()))
 
 
+def names_of_cases() -> str:
+    """Names of the built-in cases, for messages."""
+    return ", ".join(built_in_files())
+
+
 def locate(name: str | Path, folder: Path) -> Traversable:
     """A built-in case by its name, else a file, relative to `folder`."""
     built_in = built_in_files().get(name) if isinstance(name, str) else None
@@ -132,16 +138,18 @@ def read(file: Traversable) -> CaseFile:
 
 
 def _parse(file: Traversable, readers: Sequence[Source]) -> Table:
+    asked = f"{readers[-1].file}: base = {show(readers[-1].table['base'])}: " if readers else ""
     try:
         return tomllib.loads(file.read_bytes().decode("utf-8-sig"))
     except OSError as error:
-        asked = f"{readers[-1].file}: base = {show(readers[-1].table['base'])}: " if readers else ""
-        names = ", ".join(built_in_files())
-        raise CaseError(f"{asked}{file}: cannot be read: {error.strerror}; the built-in cases are {names}") from None
+        reason = f"cannot be read: {error.strerror}; the built-in cases are {names_of_cases()}"
+        raise CaseError(f"{asked}{file}: {reason}") from None
     except UnicodeDecodeError as error:
-        raise CaseError(f"{file}: not valid TOML: not UTF-8 text at byte {error.start}") from None
+        raise CaseError(f"{asked}{file}: not valid TOML: not UTF-8 text at byte {error.start}") from None
     except ValueError as error:  # TOMLDecodeError, and what Python says to a number of thousands of digits
-        raise CaseError(f"{file}: not valid TOML: {error}") from None
+        raise CaseError(f"{asked}{file}: not valid TOML: {error}") from None
+    except RecursionError:
+        raise CaseError(f"{asked}{file}: not valid TOML: nested too deeply") from None
 
 
 def _base(source: Source) -> Traversable | None:
@@ -150,6 +158,8 @@ def _base(source: Source) -> Traversable | None:
         return None
     if not isinstance(base, str):
         raise CaseError(f"{source.file}: base = {show(base)} must be the name of a built-in case or a relative path")
+    if not base.isprintable() or len(base) > LONGEST_PATH:
+        raise CaseError(f"{source.file}: base = {show(base)}: no such file; the built-in cases are {names_of_cases()}")
     return locate(base, source.file.parent if isinstance(source.file, Path) else Path())
 
 

@@ -196,8 +196,8 @@ def refuse(folder: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        at = Path(error.filename or folder)
-        if not at.is_relative_to(folder) and not folder.is_relative_to(at):
+        at, wanted = Path(error.filename or folder).absolute(), folder.absolute()
+        if not at.is_relative_to(wanted) and not wanted.is_relative_to(at):
             raise  # not for want of a place to write
         raise RefusedRequest(f"cannot write to {folder}: {error.strerror}; choose another folder with --out") from None
     except (StudyError, SimulationError, NoEquilibrium) as error:

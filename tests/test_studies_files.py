@@ -1,5 +1,6 @@
 """Case files: the actuator they describe, their units, and one line for everything that can be wrong."""
 
+import json
 import math
 from dataclasses import fields, replace
 from pathlib import Path
@@ -368,6 +369,26 @@ def test_bases_in_a_circle(load, tmp_path):
         CaseError, match=r"case\.toml: base goes in a circle: .*case\.toml -> .*other\.toml -> .*case\.toml$"
     ):
         load('base = "other.toml"')
+
+
+@pytest.mark.parametrize("name", ["\0", "line\n", "x" * 5000])
+def test_a_base_that_can_be_no_file_is_refused_in_one_short_line(load, name):
+    with pytest.raises(
+        CaseError, match=r"case\.toml: base = \"[^\n]{1,70}: no such file; the built-in cases are aileron"
+    ) as found:
+        load(f"base = {json.dumps(name)}")
+    assert str(found.value).isprintable()
+
+
+def test_a_base_that_is_no_toml_is_named_with_the_file_that_asks_for_it(load, tmp_path):
+    (tmp_path / "notes.toml").write_text("root:x:0")
+    with pytest.raises(CaseError, match=r'case\.toml: base = "notes\.toml": .*notes\.toml: not valid TOML: Expected'):
+        load('base = "notes.toml"')
+
+
+def test_a_file_that_is_nested_too_deeply_says_so(load):
+    with pytest.raises(CaseError, match=r"case\.toml: not valid TOML: nested too deeply$"):
+        load("title = " + "[" * 1000 + "]" * 1000)
 
 
 # -- wrong files -----------------------------------------------------------------------------------------

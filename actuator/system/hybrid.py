@@ -18,17 +18,16 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from actuator.system.parameters import Parameter
 from gear.quantities import require_known, show
-from gear.quantities.roles import FrictionMemory, Role
+from gear.quantities.roles import AnyRole, FrictionMemory, Role, find_role
 
 MARGIN_BAND = 1e-10
-AnyRole = TypeVar("AnyRole", bound=Role)
 
 
 class Quantity(NamedTuple):
@@ -44,7 +43,7 @@ class Quantity(NamedTuple):
 
     def role(self, kind: type[AnyRole]) -> AnyRole | None:
         """Its role of that kind, or None."""
-        return next((role for role in self.roles if isinstance(role, kind)), None)
+        return find_role(self.roles, kind)
 
 
 class Clock(NamedTuple):
@@ -186,11 +185,6 @@ class HybridSystem:
     def margin_names(self) -> tuple[str, ...]:
         """Names of the events."""
         return tuple(event.name for event in self.events)
-
-    @property
-    def travel(self) -> dict[str, int]:
-        """Per contact the direction in which it slides when the output moves forward."""
-        return {contact.name: contact.direction for contact in self.contacts}
 
     def parameters_having(self, role: type[Role]) -> tuple[Parameter, ...]:
         """The parameters that have a role, in the order of p."""

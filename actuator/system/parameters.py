@@ -7,10 +7,9 @@ from typing import Any, NamedTuple, TypeVar
 import casadi as ca
 
 from gear.quantities import annotations, unit_of
-from gear.quantities.roles import Breakaway, InLoop, IntegralGain, Role, roles_in
+from gear.quantities.roles import AnyRole, Breakaway, InLoop, IntegralGain, Role, find_role, roles_in
 
 Component = TypeVar("Component")
-AnyRole = TypeVar("AnyRole", bound=Role)
 
 
 class Parameter(NamedTuple):
@@ -26,7 +25,7 @@ class Parameter(NamedTuple):
 
     def role(self, kind: type[AnyRole]) -> AnyRole | None:
         """Its role of that kind, or None."""
-        return next((role for role in self.roles if isinstance(role, kind)), None)
+        return find_role(self.roles, kind)
 
 
 def parameterize(component: Component, path: str) -> tuple[Component, list[Parameter]]:

@@ -7,7 +7,7 @@ meaning off a name. A new role is a new class here; a quantity may have several.
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, TypeVar
 
 
 @dataclass(frozen=True)
@@ -158,6 +158,14 @@ class LoopSignal(Role):
     """A signal inside a control loop, as output, as the input that is added to it, or as the state that holds it."""
 
     signal: str
+
+
+AnyRole = TypeVar("AnyRole", bound=Role)
+
+
+def find_role(roles: tuple[Role, ...], kind: type[AnyRole]) -> AnyRole | None:
+    """The first role of a kind; None where there is none."""
+    return next((role for role in roles if isinstance(role, kind)), None)
 
 
 def roles_in(notes: tuple) -> tuple[Role, ...]:

@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import casadi as ca
 
+from gear.friction.tables import piecewise_linear
 from gear.lubrication.drag import Thickening
 from gear.quantities import Scalar
 from gear.quantities.registry import part
@@ -59,15 +60,6 @@ class Drag(ShaftDrag):
         The first part of the table and its image are one straight line through standstill, where there is no corner.
         """
         first = self.speeds[1]
-        opposing = self.torques[1] / first * ca.fmax(-first, ca.fmin(speed, first))
-        for low, high, begin, end in zip(
-            self.speeds[1:], self.speeds[2:], self.torques[1:], self.torques[2:], strict=False
-        ):
-            passed = _clip(speed - low, high - low) - _clip(-speed - low, high - low)
-            opposing += (end - begin) / (high - low) * passed
-        return -opposing * (1.0 if self.thickening is None else self.thickening.factor())
-
-
-def _clip(value: Scalar, width: float) -> Scalar:
-    """A value within 0 and a width."""
-    return ca.fmin(ca.fmax(value, 0), width)
+        through = self.torques[1] / first * ca.fmax(-first, ca.fmin(speed, first))
+        table = [piecewise_linear(side, self.speeds[1:], self.torques[1:]) for side in (speed, -speed)]
+        return -(through + (table[0] - table[1])) * (1.0 if self.thickening is None else self.thickening.factor())
